@@ -8,6 +8,7 @@ known: they are kept as they come.
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -83,7 +84,6 @@ def encode_status_0230(status: PalmStatus) -> bytes:
     """
     if status.auxiliary is None:
         raise CodecError("a status without its auxiliary part", where="palm 0230")
-    packets = [word for packet in zip(_words(status.torque), _words(status.misc), strict=True) for word in packet]
     return _pack(
         _STATUS_0230,
         "0230",
@@ -95,13 +95,7 @@ def encode_status_0230(status: PalmStatus) -> bytes:
         np.asarray(status.tactile, np.uint8).tobytes(),
         status.auxiliary.data_type,
         *_words(status.auxiliary.words),
-        status.motor_data_type,
-        status.which_motors,
-        status.arrived,
-        status.had_errors,
-        *packets,
-        status.idle_time_us,
-        *_can(status.can),
+        *_motor_fields(status),
     )
 
 
@@ -116,23 +110,14 @@ def decode_status_0230(payload: bytes) -> PalmStatus:
     links, rest = rest[: _FINGERS * _LINK_WORDS], rest[_FINGERS * _LINK_WORDS :]
     (tactile_type, valid, tips, aux_type), rest = rest[:4], rest[4:]
     aux, rest = rest[:_AUX_WORDS], rest[_AUX_WORDS:]
-    (kind, which_motors, arrived, had_errors), rest = rest[:4], rest[4:]
-    packets, (idle_us, *can) = rest[: 2 * MOTORS_PER_STATUS], rest[2 * MOTORS_PER_STATUS :]
     words = np.array(links, np.uint16).reshape(_FINGERS, _LINK_WORDS)
     return PalmStatus(
         edc_command=edc,
         sensors=np.array(sensors, np.uint16),
-        motor_data_type=kind,
-        which_motors=which_motors,
-        arrived=arrived,
-        had_errors=had_errors,
-        torque=np.array(packets[::2], np.int16),
-        misc=np.array(packets[1::2], np.uint16),
+        **_of_motors(rest),
         tactile_data_type=tactile_type,
         tactile_valid=valid,
         tactile=np.frombuffer(tips, np.uint8).reshape(_FINGERS, _TIP_BYTES),
-        idle_time_us=idle_us,
-        can=CanFrame(*can),
         auxiliary=PalmAuxiliary(words, aux_type, np.array(aux, np.uint16)),
     )
 
@@ -143,7 +128,6 @@ def encode_status_0250(status: PalmStatus) -> bytes:
     Raises:
         CodecError: a value does not fit its field.
     """
-    packets = [word for packet in zip(_words(status.torque), _words(status.misc), strict=True) for word in packet]
     return _pack(
         _STATUS_0250,
         "0250",
@@ -152,13 +136,7 @@ def encode_status_0250(status: PalmStatus) -> bytes:
         status.tactile_data_type,
         status.tactile_valid,
         np.asarray(status.tactile, np.uint8).tobytes(),
-        status.motor_data_type,
-        status.which_motors,
-        status.arrived,
-        status.had_errors,
-        *packets,
-        status.idle_time_us,
-        *_can(status.can),
+        *_motor_fields(status),
     )
 
 
@@ -171,23 +149,37 @@ def decode_status_0250(payload: bytes) -> PalmStatus:
     edc, *rest = _unpack(_STATUS_0250, payload, "0250", "status")
     sensors, rest = rest[: len(SENSORS)], rest[len(SENSORS) :]
     (tactile_type, valid, tips), rest = rest[:3], rest[3:]
-    (kind, which_motors, arrived, had_errors), rest = rest[:4], rest[4:]
-    packets, (idle_us, *can) = rest[: 2 * MOTORS_PER_STATUS], rest[2 * MOTORS_PER_STATUS :]
     return PalmStatus(
         edc_command=edc,
         sensors=np.array(sensors, np.uint16),
-        motor_data_type=kind,
-        which_motors=which_motors,
-        arrived=arrived,
-        had_errors=had_errors,
-        torque=np.array(packets[::2], np.int16),
-        misc=np.array(packets[1::2], np.uint16),
+        **_of_motors(rest),
         tactile_data_type=tactile_type,
         tactile_valid=valid,
         tactile=np.frombuffer(tips, np.uint8).reshape(_FINGERS, MAGNETIC_TIP_BYTES),
-        idle_time_us=idle_us,
-        can=CanFrame(*can),
     )
+
+
+def _motor_fields(status: PalmStatus) -> tuple[Any, ...]:
+    """What ends a status: the motors' part, idle time, and the bridge's."""
+    packets = [word for packet in zip(_words(status.torque), _words(status.misc), strict=True) for word in packet]
+    head = status.motor_data_type, status.which_motors, status.arrived, status.had_errors
+    return (*head, *packets, status.idle_time_us, *_can(status.can))
+
+
+def _of_motors(fields: Sequence[Any]) -> dict[str, Any]:
+    """The inverse of :func:`_motor_fields`, by the names of :class:`PalmStatus`."""
+    (kind, which_motors, arrived, had_errors), rest = fields[:4], fields[4:]
+    packets, (idle_us, *can) = rest[: 2 * MOTORS_PER_STATUS], rest[2 * MOTORS_PER_STATUS :]
+    return {
+        "motor_data_type": kind,
+        "which_motors": which_motors,
+        "arrived": arrived,
+        "had_errors": had_errors,
+        "torque": np.array(packets[::2], np.int16),
+        "misc": np.array(packets[1::2], np.uint16),
+        "idle_time_us": idle_us,
+        "can": CanFrame(*can),
+    }
 
 
 def _head(command: PalmCommand) -> tuple[int, int, int, int]:
