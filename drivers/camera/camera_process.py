@@ -64,12 +64,8 @@ class CameraProcess:
 
     def receive(self) -> list[Datagram]:
         """Packets since the last call, oldest first. Raises DeviceError if the camera has stopped."""
-        records, self._kept = self._kept, []
-        while (more := self._child.read_records()) is not None:
-            records += more
-        for record in records:
-            self._raise_error(record)
-        return [Datagram(record.payload, record.stamp_ns) for record in records if record.kind is RecordKind.RECEIVED]
+        kept, self._kept = self._kept, []
+        return self._child.datagrams(self._raise_error, kept)
 
     def report(self) -> dict[str, Any]:
         """Frames and markers seen so far, writes that the pipe did not accept, and problems in plain English.

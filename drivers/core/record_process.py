@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from drivers.core.child_process import ChildProcess, read_answer
@@ -10,6 +10,7 @@ from drivers.core.clock import NANOSECONDS, MonotonicClock
 from drivers.core.errors import DeviceError
 from drivers.core.orders import Order
 from drivers.core.records import LONGEST, Record, RecordKind, RecordReader
+from drivers.core.transports import Datagram
 
 
 class RecordProcess(ChildProcess):
@@ -39,6 +40,23 @@ class RecordProcess(ChildProcess):
         """
         data = self.read(patience_s)
         return None if data is None else self._records.feed(data)
+
+    def datagrams(self, on_record: Callable[[Record], None], before: Sequence[Record] = ()) -> list[Datagram]:
+        """What its device has sent since the last call, oldest first.
+
+        Args:
+            on_record: sees every record, and may raise its error.
+            before: records that were read earlier.
+
+        Raises:
+            DeviceError, CodecError: as :meth:`read_records`.
+        """
+        records = list(before)
+        while (more := self.read_records()) is not None:
+            records += more
+        for record in records:
+            on_record(record)
+        return [Datagram(record.payload, record.stamp_ns) for record in records if record.kind is RecordKind.RECEIVED]
 
     def await_record(self, kind: RecordKind, patience_s: float, aside: Callable[[Record], None]) -> dict[str, Any]:
         """The JSON content of the next record of a kind.

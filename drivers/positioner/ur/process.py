@@ -66,12 +66,7 @@ class UrProcess:
 
     def receive(self) -> list[Datagram]:
         """Statuses since the last call, oldest first. Raises DeviceError for what ended the process."""
-        records: list[Record] = []
-        while (more := self._child.read_records()) is not None:
-            records += more
-        for record in records:
-            self._raise_error(record)
-        return [Datagram(record.payload, record.stamp_ns) for record in records if record.kind is RecordKind.RECEIVED]
+        return self._child.datagrams(self._raise_error)
 
     def _raise_error(self, record: Record) -> None:
         if record.kind is RecordKind.ERROR:
