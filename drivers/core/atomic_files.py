@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from drivers.core.errors import WriteError
+from drivers.core.errors import ConfigurationError, WriteError
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -41,6 +41,13 @@ def write_whole(
     finally:  # after an interruption too; nothing is left of it when all went well
         with suppress(OSError):  # where the folder is none, either
             partial.unlink(missing_ok=True)
+
+
+def refuse_existing(targets: Sequence[Path]) -> None:
+    """Before anything is read: nothing that exists is written over. Raises ConfigurationError."""
+    for target in targets:
+        if target.exists() or target.is_symlink():
+            raise ConfigurationError("exists already", where=str(target), hint="Choose another name, or remove it")
 
 
 @contextmanager

@@ -15,7 +15,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,8 +23,7 @@ from types import MappingProxyType
 
 import trimesh
 
-from drivers.core.atomic_files import write_whole, writing_into
-from drivers.core.errors import ConfigurationError
+from drivers.core.atomic_files import refuse_existing, write_whole, writing_into
 from tactile_lab.evaluation.files.mesh_io import write_glb
 from tactile_lab.evaluation.files.plain import json_text
 from tactile_lab.models.robot_files import VISUAL_FILE, mjcf, part_file, sdf, urdf
@@ -54,24 +53,33 @@ def write_model(folder: Path, model: SolidModel, formats: Sequence[Format]) -> l
     """Write a model's files to a new folder, all or none of them.
 
     Returns:
-        The files, in the order of the table above.
+        The files, by name.
 
     Raises:
         ConfigurationError: the folder exists, or a package for a format is missing.
         WriteError: the disk is full, or the folder cannot be written.
     """
-    if folder.exists():
-        raise ConfigurationError("exists already", where=str(folder), hint="Choose another folder, or remove it")
+    refuse_existing([folder])
     with writing_into(folder.parent):
         folder.parent.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory(prefix=f".{folder.name}-", dir=folder.parent) as unfinished:
             place = Path(unfinished) / folder.name
             place.mkdir()
-            for each in dict.fromkeys(formats):
-                _WRITERS[each](place, model)
-            write_whole(place / "model.json", json_text(model.as_json()))
+            _write_all(place, model, set(formats))
             place.rename(folder)
     return sorted(folder.iterdir())
+
+
+def _write_all(folder: Path, model: SolidModel, formats: Collection[Format]) -> None:
+    texts = [_TEXTS[each] for each in formats if each in _TEXTS]
+    alone = {each for each in formats if each in _WRITERS} | ({Format.OBJ} if texts else set())
+    for each in alone:
+        _WRITERS[each](folder, model)
+    if texts:
+        _write_parts(folder, model)
+    for suffix, text in texts:
+        write_whole(folder / f"{model.name}.{suffix}", text(model))
+    write_whole(folder / "model.json", json_text(model.as_json()))
 
 
 def _stl(mesh: trimesh.Trimesh) -> bytes:
@@ -95,14 +103,9 @@ def _write_glb(folder: Path, model: SolidModel) -> None:
     write_glb(folder / "surface.glb", mesh)
 
 
-def _write_simulator(name: str, text: Callable[[SolidModel], str]) -> Callable[[Path, SolidModel], None]:
-    def write(folder: Path, model: SolidModel) -> None:
-        _write_obj(folder, model)
-        for number, part in enumerate(model.parts):
-            write_whole(folder / part_file(number), _stl(part))
-        write_whole(folder / f"{model.name}.{name}", text(model))
-
-    return write
+def _write_parts(folder: Path, model: SolidModel) -> None:
+    for number, part in enumerate(model.parts):
+        write_whole(folder / part_file(number), _stl(part))
 
 
 def _write_usd(folder: Path, model: SolidModel) -> None:
@@ -110,13 +113,9 @@ def _write_usd(folder: Path, model: SolidModel) -> None:
 
 
 _WRITERS: Mapping[Format, Callable[[Path, SolidModel], None]] = MappingProxyType(
-    {
-        Format.STL: _write_stl,
-        Format.OBJ: _write_obj,
-        Format.GLB: _write_glb,
-        Format.URDF: _write_simulator("urdf", urdf),
-        Format.SDF: _write_simulator("sdf", sdf),
-        Format.MJCF: _write_simulator("xml", mjcf),
-        Format.USD: _write_usd,
-    }
+    {Format.STL: _write_stl, Format.OBJ: _write_obj, Format.GLB: _write_glb, Format.USD: _write_usd}
 )
+_TEXTS: Mapping[Format, tuple[str, Callable[[SolidModel], str]]] = MappingProxyType(
+    {Format.URDF: ("urdf", urdf), Format.SDF: ("sdf", sdf), Format.MJCF: ("xml", mjcf)}
+)
+"""Suffix and text of the formats that name mesh files beside them."""

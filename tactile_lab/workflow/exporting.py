@@ -11,7 +11,7 @@ import numpy as np
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Contact
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import SessionError
 from sessions.exchange.archives import export_archive
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from sessions.exchange.sample_tables import SampleTables, read_tables
@@ -21,13 +21,6 @@ from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.workflow.replaying import recorded_slam, true_poses
-
-
-def refuse_existing(targets: Sequence[Path]) -> None:
-    """Before anything is read: nothing that exists is written over. Raises ConfigurationError."""
-    for target in targets:
-        if target.exists() or target.is_symlink():
-            raise ConfigurationError("exists already", where=str(target), hint="Choose another name, or remove it")
 
 
 @dataclass(frozen=True)

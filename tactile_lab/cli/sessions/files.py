@@ -57,13 +57,14 @@ def export(
     """Export a session to other formats: its grasps as a contact log, its samples as tables, or the whole session."""
     from dataclasses import asdict
 
+    from drivers.core.atomic_files import refuse_existing
     from tactile_lab.cli.console import answer, count, emit_json, say
     from tactile_lab.workflow import exporting
 
     del no_input
     if not any((contacts, csv, hdf5, rosbag, archive)):
         raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --archive")
-    exporting.refuse_existing([place for place in (contacts, csv, hdf5, rosbag, archive) if place is not None])
+    refuse_existing([place for place in (contacts, csv, hdf5, rosbag, archive) if place is not None])
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)

@@ -48,6 +48,7 @@ def export(
     The model stands on z = 0. Its surface is closed everywhere: model.json says how uncertain it is, and how much of it
     is a guess between contacts.
     """
+    from drivers.core.atomic_files import refuse_existing
     from sessions.recording.session import RESULTS
     from sessions.recording.session_ids import slug
     from tactile_lab.cli.console import answer, emit_json, warn
@@ -56,6 +57,7 @@ def export(
 
     del no_input
     wanted = _chosen(formats)
+    refuse_existing([out])
     found = choose_session(root, session)
     named = slug(name or found.manifest.object_name)
     model = make_model(found.folder / RESULTS / "mesh.ply", named, mass_kg, friction)
