@@ -111,7 +111,7 @@ class Turned:
         turned, rings = revolve(line_m, step_m)
         normals = area_weighted_normals(turned)
         sigma_m = np.hypot(sigma_m[rings], self.axis_sigma_m * np.linalg.norm(normals[:, :2], axis=1))
-        vertices_m = turned.vertices_m + [*self.axis_m, 0.0]
+        vertices_m = turned.vertices_m + np.append(self.axis_m, 0.0)
         return SurfaceMesh(vertices_m, turned.triangles, sigma_m, normals, is_closed=section.is_closed)
 
 
