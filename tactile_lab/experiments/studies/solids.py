@@ -125,8 +125,8 @@ EVERYDAY = Experiment(
 
 EVERYDAY_SHAPE = Experiment(
     "everyday-shape",
-    "The shape of everyday things on a table from grasps at all heights and known poses, with and without profiles that "
-    "turn about an axis.",
+    "Shapes of everyday things on a table from grasps at all heights and known poses, with and without solids of "
+    "revolution.",
     _everyday_shapes,
     everyday_shape.shape_at_known_poses,
     (

@@ -27,6 +27,7 @@ _FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
 _NOISE_SIGMAS = 2.0
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
+_LARGEST_SHARE_OFF_TURNED = 0.01
 _KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
 """Cost of a contact that is centimetres off the surface: that of one outlier among twenty good contacts."""
@@ -78,8 +79,21 @@ def best_spatial_shape(
             best, most = shape, evidence
     if floor_m is None or "turned" in without:
         return best
-    turned = _try_make(lambda: Turned.fit(everything, floor_m, free_points_m))
-    return turned if isinstance(turned, Turned) and turned.log_evidence > most + left_out_nats else best
+    return _turned(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+
+
+def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Turned | None:
+    """The solid of revolution, if it has more evidence and hardly any contact is off its surface.
+
+    Its evidence is a marginal likelihood like the field's, so that no cross-validation is needed. A handle has only a few
+    contacts: the body may well be likelier without them, but then the handle would be missing.
+    """
+    shape = _try_make(lambda: Turned.fit(gpis, floor_m, free_points_m))
+    if not isinstance(shape, Turned):
+        return None
+    off = _LARGEST_SHARE_OFF_TURNED
+    evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if evidence > at_least else None
 
 
 def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> bool:
@@ -132,9 +146,15 @@ def _try_make(maker: Callable[[], FittedShape]) -> FittedShape | None:
 
 
 def _checked_evidence(
-    shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None, *, at_least: float
+    shape: FittedShape,
+    gpis: Gpis,
+    free_points_m: Array | None,
+    floor_m: float | None,
+    *,
+    at_least: float,
+    largest_share_off: float = _LARGEST_SHARE_OFF,
 ) -> float:
-    """The evidence of a sharp solid, reduced for contacts that its planes explain but its surface excludes.
+    """The evidence of a solid, reduced for contacts that its planes explain but its surface excludes.
 
     Minus infinity if it has no surface, excludes many contacts, or fills free places. Its surface is computed only if
     the evidence can reach ``at_least``.
@@ -147,7 +167,7 @@ def _checked_evidence(
         return -np.inf
     away_m = distances_to_mesh(gpis.contacts_m, mesh)
     free = np.empty((0, 3)) if free_points_m is None or "contradictions" in gpis.settings.without else free_points_m
-    if np.mean(away_m > _ON_SURFACE_m) > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
+    if np.mean(away_m > _ON_SURFACE_m) > largest_share_off or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
         return -np.inf
     return shape.log_evidence - stray_cost(away_m, contacts_of(gpis).point_weights)
 

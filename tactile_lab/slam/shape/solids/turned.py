@@ -156,13 +156,18 @@ def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> A
         return -half.log_marginal_likelihood() - _around(contacts, axis_m)[1]
 
     simplex = start_m + _AXIS_STEP_m * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    options = {
-        "initial_simplex": simplex,
-        "xatol": _AXIS_TOLERANCE_m,
-        "fatol": _EVIDENCE_TOLERANCE,
-        "maxfev": _AXIS_TRIES,
-    }
-    return np.asarray(minimize(cost, start_m, method="Nelder-Mead", options=options).x)
+    found = minimize(
+        cost,
+        start_m,
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": simplex,
+            "xatol": _AXIS_TOLERANCE_m,
+            "fatol": _EVIDENCE_TOLERANCE,
+            "maxfev": _AXIS_TRIES,
+        },
+    )
+    return np.asarray(found.x)
 
 
 def _to_profile(points_m: Array, axis_m: Array) -> Array:
