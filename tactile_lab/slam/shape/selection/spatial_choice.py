@@ -85,8 +85,8 @@ def best_spatial_shape(
 def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Turned | None:
     """The solid of revolution, if it has more evidence and hardly any contact is off its surface.
 
-    Its evidence is a marginal likelihood like the field's, so that no cross-validation is needed. A handle has only a few
-    contacts: the body may well be likelier without them, but then the handle would be missing.
+    Its evidence is a marginal likelihood like the field's, so that no cross-validation is needed. A handle has only a
+    few contacts: the body may well be likelier without them, but then the handle would be missing.
     """
     shape = _try_make(lambda: Turned.fit(gpis, floor_m, free_points_m))
     if not isinstance(shape, Turned):
