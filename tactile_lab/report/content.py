@@ -48,7 +48,7 @@ class SessionFacts:
 
 @dataclass(frozen=True)
 class Surface:
-    """A triangle mesh in the estimate's object frame with a standard deviation at each vertex."""
+    """A triangle mesh in the estimate's object frame with a standard deviation at each vertex, NaN for a guess."""
 
     vertices_m: Array
     faces: Faces
@@ -95,7 +95,7 @@ class ReportContent:
         evaluation: ``evaluation.json``, or None if the session was not evaluated.
         surface: the estimated surface, or None if there is none.
         contour_m: the estimated contour or section, shape (n, 2), estimate's object frame, or None.
-        contour_sigma_m: standard deviation at each point of the contour, shape (n,).
+        contour_sigma_m: standard deviation at each point of the contour, shape (n,); NaN where it is a guess.
         truth: ground truth, or None.
         fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
         course: decisions and stops of the session.

@@ -97,7 +97,9 @@ def read_surface(path: Path) -> Surface:
     Raises:
         ShapeError: not a mesh written by this program.
     """
-    mesh, sigma_m = read_estimated_mesh(path)
+    found = read_estimated_mesh(path)
+    sigma_m = np.where(found.known, found.sigma_m, np.nan)
+    mesh = found.mesh
     return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces), sigma_m, np.asarray(mesh.vertex_normals))
 
 
@@ -118,8 +120,11 @@ def _outline(folder: Path, results: Results, surface: Surface | None) -> tuple[A
 def _contour(path: Path, results: Results) -> tuple[Array | None, Array]:
     if not path.is_file():
         return None, np.zeros(0)
-    sigma_m = results.slam.get("contour_sigma_m") or ()
-    return read_contour(path)[:-1], np.array(sigma_m, dtype=float)
+    sigma_m = np.array(results.slam.get("contour_sigma_m") or (), dtype=float)
+    known = results.slam.get("contour_known")
+    if known is not None and len(known) == len(sigma_m):
+        sigma_m[~np.array(known, dtype=bool)] = np.nan
+    return read_contour(path)[:-1], sigma_m
 
 
 def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None:

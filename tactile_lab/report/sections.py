@@ -16,7 +16,12 @@ from tactile_lab.report.markup import Markup, badge, element, figure, join, mark
 from tactile_lab.report.rendering import VIEWS, views
 from tactile_lab.report.viewer import surface_colours, viewer_data
 
-_STATUS = {"ok": ("tracked", "good"), "lost": ("object lost", "bad")}
+_STATUS = {
+    "complete": ("complete", "good"),
+    "partial": ("partly known", "warn"),
+    "ambiguous": ("ambiguous", "bad"),
+    "lost": ("object lost", "bad"),
+}
 
 
 def head(content: ReportContent) -> Markup:
@@ -45,7 +50,9 @@ def head(content: ReportContent) -> Markup:
 
 
 def _badges(content: ReportContent) -> list[Markup]:
-    text, kind = _STATUS.get(str(content.results.slam["status"]), (str(content.results.slam["status"]), "warn"))
+    status, share = content.results.status, content.results.known_share
+    text, kind = _STATUS.get(status, (status, "warn"))
+    text += "" if share is None else f", {share:.0%} touched"
     found = [badge(text, kind)]
     if content.evaluation is None:
         found.append(badge("not evaluated", "warn"))
@@ -114,6 +121,8 @@ def _shape_lead(content: ReportContent) -> str:
 
 def _top_view_card(content: ReportContent, picture: str) -> Markup:
     keys = [("contour", "estimate"), ("contour_band", "two standard deviations"), ("contact", "contact with normal")]
+    if not np.isfinite(content.contour_sigma_m).all():
+        keys.insert(1, ("guess", "guess: nothing was touched near it"))
     if content.truth_outline_m() is not None:
         keys.insert(1, ("truth", "true outline, aligned at the first grasp"))
     if content.fitted_outline_m is not None:
@@ -135,6 +144,7 @@ def _scale(sigma_m: np.ndarray[Any, Any]) -> Markup:
 
 _SAMPLES = {
     "contour": '<line class="contour" x1="3" y1="6" x2="21" y2="6" style="stroke:#21918c"/>',
+    "guess": '<path class="guess" d="M1 6H23"/>',
     "contour_band": '<rect class="band" x="1" y="1" width="22" height="10"/>',
     "estimate": '<path class="estimate" d="M1 6H23"/>',
     "truth-fit": '<path class="truth-fit" d="M1 6H23"/>',

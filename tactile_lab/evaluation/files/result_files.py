@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array, Grasp
@@ -104,18 +105,19 @@ def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh 
     placed = next((pose for pose in result.world_T_object if pose is not None), None)
     if result.contour is None or placed is None or not heights.size or heights.max() < _LEAST_HEIGHT_m:
         return None
-    ring, sigma_m = _ring_with_sigma(result.contour)
+    ring, nearest = _ring_of(result.contour)
+    sigma_m, known = result.contour.sigma_m[nearest], result.contour.known
     origin_m = float(placed.z())
     vertices, faces = prism(ring, -origin_m, float(heights.max()) - origin_m)
     normals = _vertex_normals(vertices, faces)
-    return SurfaceMesh(vertices, faces, np.tile(sigma_m, 2), normals, result.contour.is_closed)
+    touched = None if known is None else np.tile(known[nearest], 2)
+    return SurfaceMesh(vertices, faces, np.tile(sigma_m, 2), normals, result.contour.is_closed, touched)
 
 
-def _ring_with_sigma(contour: Contour) -> tuple[Array, Array]:
-    """The contour as in ``contour.csv``, with the standard deviation at each point."""
+def _ring_of(contour: Contour) -> tuple[Array, NDArray[np.intp]]:
+    """The contour as in ``contour.csv``, and the index of the contour's point at each of its points."""
     ring = open_ring(contour.points_m)
-    nearest = np.argmin(np.sum((ring[:, None] - contour.points_m[None]) ** 2, axis=2), axis=1)
-    return ring, contour.sigma_m[nearest]
+    return ring, np.argmin(np.sum((ring[:, None] - contour.points_m[None]) ** 2, axis=2), axis=1)
 
 
 def _vertex_normals(vertices: Array, faces: Triangles) -> Array:
@@ -134,14 +136,26 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "seed": result.seed,
         "dimension": result.dimension,
         "status": result.status,
+        "known_share": result.known_share,
+        "doubts": result.doubts,
+        "alternatives": result.alternatives,
         **({"warnings": result.warnings} if result.warnings else {}),
         "settings": settings,
         "steps": [_without_duration(step) for step in result.steps],
         "covariances": result.covariances,
         "loops": result.loops,
         "sigma_quantiles_m": _sigma_quantiles(result),
-        "contour_sigma_m": None if result.contour is None else _ring_with_sigma(result.contour)[1],
+        **_along_contour(result.contour),
     }
+
+
+def _along_contour(contour: Contour | None) -> dict[str, Any]:
+    """Standard deviation and whether it was touched, at each point of ``contour.csv``."""
+    if contour is None:
+        return {"contour_sigma_m": None, "contour_known": None}
+    _, nearest = _ring_of(contour)
+    known = None if contour.known is None else contour.known[nearest]
+    return {"contour_sigma_m": contour.sigma_m[nearest], "contour_known": known}
 
 
 def _sigma_quantiles(result: SlamResult) -> Array | None:

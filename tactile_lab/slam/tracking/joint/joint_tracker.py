@@ -20,7 +20,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.fixed_lag import unfold
 from tactile_lab.slam.tracking.evidence.motion_cost import estimated_noise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
-from tactile_lab.slam.tracking.faces.relocalization import relocalize
+from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
 from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 from tactile_lab.slam.tracking.joint.branching import Branching
 from tactile_lab.slam.tracking.joint.deferred_association import (
@@ -83,6 +83,7 @@ class JointTracker:
         self._whole: tuple[ContactMap, ContactMap] | None = None
         self._refined: tuple[ContactMap, ContactMap] | None = None
         self._has_ended = False
+        self._rivals: tuple[Hypothesis, ...] = ()
         self.effective_count = 1.0
 
     @property
@@ -113,6 +114,12 @@ class JointTracker:
     def hypotheses(self) -> tuple[Hypothesis, ...]:
         """The present hypotheses, most likely first."""
         return tuple(self._hypotheses)
+
+    @property
+    def rivals(self) -> tuple[Hypothesis, ...]:
+        """At the end of a session: hypotheses that differ from the most likely one and were found less likely."""
+        rivals = (*self._hypotheses[1:], *self._rivals) if self._has_ended else ()
+        return tuple(replace(one, map=unfold(one.map)) for one in rivals)
 
     @property
     def _has_settled(self) -> bool:
@@ -217,11 +224,11 @@ class JointTracker:
 
     def _relocalize(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
         """The hypothesis with grasps relocalized on its object."""
-        return self.mechanisms.improve(
-            "placing on the object",
-            self._retry_unplaced(hypothesis, sharp),
-            lambda given: relocalize(given, sharp, self._noise, self._settings.proposals),
-        )
+        relocalizer = Relocalizer(sharp, self._noise, self._settings.proposals)
+        placed = self._retry_unplaced(hypothesis, sharp)
+        found = self.mechanisms.improve("placing on the object", placed, relocalizer.improve)
+        self._rivals = relocalizer.rivals
+        return found
 
     def _retry_unplaced(self, best: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
         """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""

@@ -71,14 +71,14 @@ def test_every_promised_file_is_written(tmp_path: Path, result: SlamResult, reco
 def test_what_is_known_well_is_written_apart(tmp_path: Path, result: SlamResult, recorded: Recorded) -> None:
     shape = result.contour if result.contour is not None else result.mesh
     assert shape is not None
-    write_results(tmp_path, result, recorded.grasps, largest_sigma_m=float(np.quantile(shape.sigma_m, 0.8)))
+    write_results(tmp_path, result, recorded.grasps, largest_sigma_m=float(np.quantile(shape.sigma_m, 0.6)))
     if result.contour is not None:
         rows = (tmp_path / "known.csv").read_text().splitlines()
         assert rows[0] == "piece,x_m,y_m"
-        assert 0.7 * len(shape.sigma_m) < len(rows) - 1 < len(shape.sigma_m)
+        assert 0.5 * len(shape.sigma_m) < len(rows) - 1 < len(shape.sigma_m)
     else:
         known, whole = (trimesh.load_mesh(tmp_path / name) for name in ("known.ply", "mesh.ply"))
-        assert 0.5 * len(whole.faces) < len(known.faces) < len(whole.faces)
+        assert 0.3 * len(whole.faces) < len(known.faces) < len(whole.faces)
 
 
 def test_results_read_back(tmp_path: Path, result: SlamResult, recorded: Recorded) -> None:
