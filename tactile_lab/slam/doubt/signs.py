@@ -18,8 +18,8 @@ from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 
-_UNDONE_SIGMA = 2.0
-"""Two successive slips, each beyond this and opposite, happen by chance in one of a thousand pairs."""
+_UNDONE = 0.02
+"""Probability of each of two slips that undo each other, or less: by chance one session in a hundred has such a pair."""
 
 _UNDONE_COSINE = -0.7
 """Cosine of the angle between two slips that undo each other, or less; for a rotation it is -1 or 1."""
@@ -62,8 +62,9 @@ def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     for part, kind in ((slice(None, split), "moved"), (slice(split, None), "turned")):
         vectors = slips[:, part]
         lengths = np.linalg.norm(vectors, axis=1)
+        least = float(np.sqrt(chi2.isf(_UNDONE, vectors.shape[1])))
         cosines = np.sum(vectors[1:] * vectors[:-1], axis=1) / np.maximum(lengths[1:] * lengths[:-1], 1e-12)
-        opposite = (cosines < _UNDONE_COSINE) & (np.minimum(lengths[1:], lengths[:-1]) > _UNDONE_SIGMA)
+        opposite = (cosines < _UNDONE_COSINE) & (np.minimum(lengths[1:], lengths[:-1]) > least)
         for step in np.flatnonzero(opposite & bound[1:] & bound[:-1]):
             grasp = int(step) + 1
             words = f"grasp {grasp + 1} is {kind} by a slip that the next one undoes: it is probably placed wrongly"
