@@ -19,7 +19,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 
 _UNDONE = 0.02
-"""Probability of each of two slips that undo each other, or less: by chance one session in a hundred has such a pair."""
+"""Probability of each of two slips that undo each other, or less: chance makes such a pair in one session of a hundred."""
 
 _UNDONE_COSINE = -0.7
 """Cosine of the angle between two slips that undo each other, or less; for a rotation it is -1 or 1."""
