@@ -137,6 +137,7 @@ def _as_figures(alternative: Mapping[str, Any]) -> dict[str, Any]:
         "probability": alternative["probability"],
         "turn_deg": math.degrees(alternative["turn_rad"]),
         "shift_mm": 1e3 * alternative["shift_m"],
+        "rms_mm": 1e3 * alternative["rms_m"],
     }
 
 

@@ -6,7 +6,16 @@ from collections.abc import Mapping
 
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.studies import ablation, everyday, exploration, laboratory, planar, solids, thesis_figures
+from tactile_lab.experiments.studies import (
+    ablation,
+    coverage,
+    everyday,
+    exploration,
+    laboratory,
+    planar,
+    solids,
+    thesis_figures,
+)
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     study.name: study
@@ -18,6 +27,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         solids.SOLID_LIMIT,
         solids.METHODS_6DOF,
         ablation.ABLATION,
+        coverage.COVERAGE,
         planar.CONTOUR_LIMIT,
         planar.RANDOM_CONTACTS,
         thesis_figures.FIGURE_2_7,

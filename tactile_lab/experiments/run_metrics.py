@@ -1,7 +1,7 @@
 """Figures of one run: quality of the shape, the tracking and the stated uncertainty, and computing time.
 
 Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error; rotations
-    of a solid about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
+    of an object about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
     surface whose true error is within two stated standard deviations.
 """
 
@@ -16,7 +16,7 @@ from drivers.core.contacts import Array
 from drivers.core.poses import spatial, transform_points
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.trajectory import Poses
-from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, stands, symmetry_turns
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, outline_symmetry, stands, symmetry_turns
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
@@ -68,10 +68,16 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
 
 def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
     """Registration error of a trajectory; rotations that no contact can distinguish are ignored."""
-    turns = symmetry_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
-    poses = modulo_symmetry(estimate, data.world_T_body, turns)
+    poses = _modulo_symmetry(data, estimate)
     contacts = [grasp.points_world_m for grasp in data.grasps]
     return registration_rms_mm(contacts, poses, data.world_T_body, dimension)
+
+
+def _modulo_symmetry(data: SimulatedGrasps, estimate: Poses) -> Poses:
+    if isinstance(data, SpatialGrasps):
+        return modulo_symmetry(estimate, data.world_T_body, symmetry_turns(data.mesh))
+    found = outline_symmetry(data.outline_m) if isinstance(data, PlanarGrasps) else None
+    return estimate if found is None else modulo_symmetry(estimate, data.world_T_body, found.order, found.centre_m)
 
 
 def _within(errors_m: Array, sigma_m: Array) -> float:

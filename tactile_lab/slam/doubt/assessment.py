@@ -16,7 +16,7 @@ from tactile_lab.slam.doubt.status import (
     Status,
     status_of,
 )
-from tactile_lab.slam.doubt.symmetry import Symmetry, symmetry_of
+from tactile_lab.slam.doubt.symmetry import NEARLY_ALIKE_m, Symmetry, symmetry_of
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
@@ -71,7 +71,7 @@ def assess(
         part = known_part(shape, contact_map.contacts, -origin_height_m if stands else None)
         shape, share = with_guesses_told(shape, part), part.share
     symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= LEAST_KNOWN_SHARE else None
-    others = _alternatives(tracker, contact_map, settings, symmetry, origin_height_m)
+    others = _alternatives(tracker, contact_map, settings, shape, symmetry, origin_height_m)
     doubts = (
         *signs(contact_map, settings.motion, poses_given=settings.method == "known-pose"),
         *doubts_of(others),
@@ -91,6 +91,7 @@ def _alternatives(
     tracker: Tracker,
     contact_map: ContactMap,
     settings: TrackingSettings,
+    shape: Contour | SurfaceMesh | None,
     symmetry: Symmetry | None,
     origin_height_m: float,
 ) -> tuple[Alternative, ...]:
@@ -98,8 +99,9 @@ def _alternatives(
     if not isinstance(tracker, JointTracker):
         return ()
     found = costs_above(tracker.hypotheses[0], tracker.rivals)
-    if symmetry is not None:
-        found += turned_by_symmetry(contact_map, symmetry, settings.motion, settings.joint.proposals.unexplained_cost)
+    near = None if shape is None else symmetry_of(shape, NEARLY_ALIKE_m)
+    if near is not None:
+        found += turned_by_symmetry(contact_map, near, settings.motion, settings.joint.proposals.unexplained_cost)
     return alternatives(contact_map, found, symmetry, origin_height_m)
 
 

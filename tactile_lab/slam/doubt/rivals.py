@@ -19,15 +19,23 @@ from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
 
 REACH = 0.05
 """Probability of all alternatives together from which an estimate is ambiguous."""
 
+_GRAVE_m = 0.003
+"""An alternative that displaces contacts by less, root mean square, is told but does not make the estimate ambiguous:
+one grasp of sixteen that is a centimetre off changes neither the shape nor the rest of the trajectory.
+"""
+
 _LEAST_TOLD = 0.01
 _LEAST_SHIFT_m = 0.005
 _SAME_m = 0.004
-_FARTHEST_nats = 10.0
+_FARTHEST_nats = 8.0
+_MOST_TURNED = 4
+"""Turns whose slips cost more are not tried, and no more than so many."""
 
 
 def alternatives(
@@ -64,35 +72,38 @@ def alternatives(
 def turned_by_symmetry(
     best: ContactMap, symmetry: Symmetry, noise: MotionNoise, unexplained_cost: float
 ) -> list[tuple[ContactMap, float]]:
-    """The trajectory with all grasps from some step on turned by a symmetry, and what each costs more.
+    """The trajectory with all grasps from some step on turned by a symmetry, smoothed, and what each costs more.
 
     Args:
         best: the estimate; only the steps of an object on a table are tried.
-        symmetry: of its shape.
+        symmetry: of its shape, perhaps an approximate one.
         noise: of the motion model.
         unexplained_cost: of a contact that nothing explains.
     """
     if best.space is not PLANAR or symmetry.interchangeable:
         return []
-    motion, rows, scorer = MotionCost.of(best, noise), best.rows, HypothesisScorer(noise, unexplained_cost)
-    now, cost = motion.steps(rows), scorer.score(best).cost
-    found = []
+    motion, rows = MotionCost.of(best, noise), best.rows
+    now, turned = motion.steps(rows), []
     for step, turn in product(range(1, len(rows)), range(1, symmetry.order)):
-        turned = rows.copy()
-        turned[step:] = PLANAR.compose(rows[step:], symmetry.offset(turn))
-        if motion.steps(turned)[step - 1] - now[step - 1] < _FARTHEST_nats:
-            other = best.with_rows(turned)
-            found.append((other, scorer.score(other).cost - cost))
-    return found
+        other = rows.copy()
+        other[step:] = PLANAR.compose(rows[step:], symmetry.offset(turn))
+        turned.append((float(motion.steps(other)[step - 1] - now[step - 1]), other))
+    likely = sorted((each for each in turned if each[0] < _FARTHEST_nats), key=lambda each: each[0])[:_MOST_TURNED]
+    if not likely:
+        return []
+    sharp = FacetedScorer(HypothesisScorer(noise, unexplained_cost), noise)
+    cost = sharp.better(best).cost
+    return [(found.map, found.cost - cost) for found in (sharp.smooth(best.with_rows(other)) for _, other in likely)]
 
 
 def doubts_of(found: Sequence[Alternative]) -> tuple[Doubt, ...]:
-    """The doubt that alternatives are, if they are likely enough together."""
+    """The doubt that alternatives are, if they are likely enough together; grave if those that displace much are."""
     if (together := sum(one.probability for one in found)) < REACH:
         return ()
+    grave = sum(one.probability for one in found if one.rms_m > _GRAVE_m) >= REACH
     grasps = tuple(sorted({grasp for one in found for grasp in one.grasps}))
     words = f"another placing is possible ({together:.0%}): {found[0].words()}"
-    return (Doubt("rivals", words, grasps),)
+    return (Doubt("rivals", words, grasps, grave),)
 
 
 def _in_same_frame(best: ContactMap, other: ContactMap) -> Array:
@@ -111,13 +122,16 @@ def _lengths(space: PoseVectors, gaps: Array) -> Array:
 
 def _shifts(best: ContactMap, rows: Array) -> Array:
     """The largest displacement of each grasp's contacts in the object frame, metres; 0 without contacts."""
-    shifts = np.zeros(len(rows))
-    for index, (grasp, row) in enumerate(zip(best.placed, rows, strict=True)):
-        world = grasp.contacts_world
-        if len(world):
-            moved = world.in_object_frame(row, best.space).points_m - best.contacts_of(index).points_m
-            shifts[index] = np.linalg.norm(moved, axis=1).max()
-    return shifts
+    return np.array([each.max(initial=0.0) for each in _displacements(best, rows)])
+
+
+def _displacements(best: ContactMap, rows: Array) -> list[Array]:
+    """The displacements of each grasp's contacts in the object frame, metres."""
+    moved = [
+        grasp.contacts_world.in_object_frame(row, best.space).points_m - best.contacts_of(index).points_m
+        for index, (grasp, row) in enumerate(zip(best.placed, rows, strict=True))
+    ]
+    return [np.linalg.norm(each, axis=1) for each in moved]
 
 
 def _all_turns(best: ContactMap, rows: Array, moved: Sequence[int], symmetry: Symmetry) -> bool:
@@ -135,7 +149,8 @@ def _alternative(
     gaps = space.deviation(rows[chosen], best.rows[chosen])
     turn_rad = float(np.linalg.norm(gaps[:, space.translations :], axis=1).max())
     poses = tuple(space.pose(row, origin_height_m) for row in rows[chosen])
-    return Alternative(moved, poses, probability, turn_rad, float(_shifts(best, rows).max()))
+    shifts = np.concatenate(_displacements(best, rows))
+    return Alternative(moved, poses, probability, turn_rad, float(shifts.max()), float(np.sqrt(np.mean(shifts**2))))
 
 
 def costs_above(best: Hypothesis, rivals: Sequence[Hypothesis]) -> list[tuple[ContactMap, float]]:

@@ -19,12 +19,12 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 
 _UNDONE = 0.02
-"""Probability of each of two slips that undo each other, or less: chance makes such a pair in one session of a hundred."""
+"""Probability of each of two slips that undo each other, or less: chance makes one such pair in a hundred sessions."""
 
 _UNDONE_COSINE = -0.7
 """Cosine of the angle between two slips that undo each other, or less; for a rotation it is -1 or 1."""
 
-_UNLIKELY = 1e-4
+_UNLIKELY = 5e-4
 """Probability of a slip under the motion model below which it is told."""
 
 _JUMP_m = 0.100

@@ -55,7 +55,8 @@ class Alternative:
         world_T_object: the object's poses at these grasps.
         probability: of this placing, if it or one of the others is right.
         turn_rad: largest rotation of a grasp relative to the estimate.
-        shift_m: largest displacement of a grasp's contacts relative to the estimate.
+        shift_m: largest displacement of a contact relative to the estimate.
+        rms_m: root mean square displacement of all contacts of the session.
     """
 
     grasps: tuple[int, ...]
@@ -63,6 +64,7 @@ class Alternative:
     probability: float
     turn_rad: float
     shift_m: float
+    rms_m: float
 
     def words(self) -> str:
         """The alternative as text."""

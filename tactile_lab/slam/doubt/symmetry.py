@@ -19,7 +19,12 @@ INTERCHANGEABLE = 6
 
 _MOST = 12
 _SOME_TURNS_rad = np.deg2rad([7.0, 20.0, 45.0, 77.0, 131.0])
-_ALIKE_m = 0.001
+ALIKE_m = 0.001
+"""Resolution of a fingertip."""
+
+NEARLY_ALIKE_m = 0.004
+"""Shapes this similar after a turn are distinguished by many contacts only: a trajectory may have mistaken the turn."""
+
 _STEP_m = 0.001
 _SAMPLES = 4000
 _LEVER_m = 0.050
@@ -69,8 +74,13 @@ class Symmetry:
         return bool(np.linalg.norm(moved) < tolerance_m and left_rad < tolerance_m / _LEVER_m)
 
 
-def symmetry_of(shape: Contour | SurfaceMesh) -> Symmetry | None:
-    """The symmetry of an outline, or of a surface about a vertical axis, to a millimetre RMS; None if it has none."""
+def symmetry_of(shape: Contour | SurfaceMesh, alike_m: float = ALIKE_m) -> Symmetry | None:
+    """The symmetry of an outline, or of a surface about a vertical axis; None if it has none.
+
+    Args:
+        shape: object frame.
+        alike_m: root mean square distance up to which the turned shape counts as the same.
+    """
     points, normals = _samples(shape)
     centre = points.mean(axis=0)[:2]
     tree = cKDTree(points)
@@ -80,7 +90,7 @@ def symmetry_of(shape: Contour | SurfaceMesh) -> Symmetry | None:
         turned[:, :2] = (points[:, :2] - centre) @ _rotation(turn_rad).T + centre
         _, nearest = tree.query(turned)
         away = np.sum((turned - points[nearest]) * normals[nearest], axis=1)
-        return bool(np.mean(away**2) < _ALIKE_m**2)
+        return bool(np.mean(away**2) < alike_m**2)
 
     if all(map(stays, _SOME_TURNS_rad)):
         return Symmetry(ROUND, centre)
