@@ -63,6 +63,8 @@ class SlamResult:
         warnings: failures that did not end the estimation.
         known_share: share of the outline or surface that was touched, 0 to 1; None without a shape.
         doubts: reasons to doubt the result.
+        common_covariances: of (x, y, yaw) in the object frame in which all grasps agree best, not in that of the first
+            grasp, which has an error too; empty for methods but "joint".
         alternatives: other placings of grasps that the contacts allow, the most likely first.
     """
 
@@ -81,6 +83,7 @@ class SlamResult:
     known_share: float | None = None
     doubts: tuple[Doubt, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
+    common_covariances: tuple[Array | None, ...] = ()
 
     @property
     def step_seconds(self) -> tuple[float, ...]:

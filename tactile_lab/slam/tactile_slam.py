@@ -196,6 +196,7 @@ class TactileSlam:
             known_share=told.known_share,
             doubts=told.doubts,
             alternatives=told.alternatives,
+            common_covariances=self._common_covariances(),
         )
 
     @property
@@ -333,6 +334,12 @@ class TactileSlam:
         return tuple(
             self._space.pose(grasp.row, self._origin_height_m) if grasp else None for grasp in self._placed_grasps()
         )
+
+    def _common_covariances(self) -> tuple[Array | None, ...]:
+        if not isinstance(self._tracker, JointTracker):
+            return ()
+        found = self._tracker.common_covariances
+        return (*[None] * (len(self._steps) - len(found)), *found)
 
     def _covariances(self) -> tuple[Array | None, ...]:
         return tuple(grasp.covariance if grasp else None for grasp in self._placed_grasps())

@@ -143,6 +143,7 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "settings": settings,
         "steps": [_without_duration(step) for step in result.steps],
         "covariances": result.covariances,
+        "common_covariances": result.common_covariances,
         "loops": result.loops,
         "sigma_quantiles_m": _sigma_quantiles(result),
         **_along_contour(result.contour),

@@ -31,6 +31,7 @@ from tactile_lab.slam.tracking.joint.deferred_association import (
 )
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest, weights
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
+from tactile_lab.slam.tracking.joint.pose_covariance import PoseCovariances, with_covariances
 from tactile_lab.slam.tracking.joint.settings import JointSettings
 from tactile_lab.slam.tracking.joint.trajectory_splicing import splice_trajectories
 
@@ -84,6 +85,7 @@ class JointTracker:
         self._refined: tuple[ContactMap, ContactMap] | None = None
         self._has_ended = False
         self._rivals: tuple[Hypothesis, ...] = ()
+        self._common_covariances = np.empty((0, self._space.size, self._space.size))
         self.effective_count = 1.0
 
     @property
@@ -114,6 +116,15 @@ class JointTracker:
     def hypotheses(self) -> tuple[Hypothesis, ...]:
         """The present hypotheses, most likely first."""
         return tuple(self._hypotheses)
+
+    @property
+    def common_covariances(self) -> Array:
+        """At the end of a session: of the last poses in the best common object frame, shape (n, size, size).
+
+        See :class:`~tactile_lab.slam.tracking.joint.pose_covariance.PoseCovariances`. Settled grasps of a long session
+        have none.
+        """
+        return self._common_covariances
 
     @property
     def rivals(self) -> tuple[Hypothesis, ...]:
@@ -197,7 +208,9 @@ class JointTracker:
             self._share_best_kernel()
         self._hypotheses = [self._associate_deferred(one) for one in self._hypotheses]
         faceted = self._score_with_facets()
-        faceted[0] = replace(faceted[0], map=self._scorer.with_covariances(faceted[0].map))
+        found = PoseCovariances.of(faceted[0].map, self._noise)
+        faceted[0] = replace(faceted[0], map=with_covariances(faceted[0].map, found.birth))
+        self._common_covariances = found.common
         self._hypotheses = [replace(one, map=unfold(one.map)) for one in faceted]
         self._has_ended = True
 
