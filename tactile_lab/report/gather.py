@@ -18,8 +18,8 @@ from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.results import Results, read_results
 from tactile_lab.evaluation.files.tables import read_contour
+from tactile_lab.evaluation.files.trajectory_file import read_trajectory
 from tactile_lab.evaluation.shape import horizontal_outline
-from tactile_lab.evaluation.trajectory import read_trajectory
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, read_truth_mesh
 from tactile_lab.report.content import ReportContent, SessionFacts, Surface, TrueShape, with_plain_lids
 from tactile_lab.report.course import read_course
@@ -118,8 +118,9 @@ def _outline(folder: Path, results: Results, surface: Surface | None) -> tuple[A
 def _contour(path: Path, results: Results) -> tuple[Array | None, Array]:
     if not path.is_file():
         return None, np.zeros(0)
-    sigma_m = results.slam.get("contour_sigma_m") or ()
-    return read_contour(path)[:-1], np.array(sigma_m, dtype=float)
+    outline = read_contour(path)
+    older = results.slam.get("contour_sigma_m") or ()  # where older results have them
+    return outline.points_m, outline.sigma_m if len(outline.sigma_m) else np.array(older, dtype=float)
 
 
 def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None:

@@ -67,7 +67,7 @@ def key_figures(content: ReportContent) -> Markup:
     tiles = [
         ("Hausdorff distance", number(shape.get("hausdorff_mm")), "mm", _best(best.get("hausdorff_mm"))),
         ("Mean distance", number(shape.get("mean_distance_mm")), "mm", _best(best.get("mean_distance_mm"))),
-        ("F-score at 5 mm", number(shape.get("fscore_5mm"), 3), "", _best(best.get("fscore_5mm"), 3, "")),
+        ("F-score at 1 mm", number(shape.get("fscore_1mm"), 3), "", _best(best.get("fscore_1mm"), 3, "")),
         ("Position error", number(pose.get("rmse_mm")), "mm", _at_end(pose, "final_mm")),
         ("Rotation error", number(pose.get("rmse_deg")), "°", _at_end(pose, "final_deg")),
         ("Grasps", str(grasps), "", f"{placed} placed, {contacts} contacts"),
