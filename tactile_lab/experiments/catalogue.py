@@ -26,6 +26,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         thesis_figures.FIGURE_3_14,
         thesis_figures.FIGURE_3_15,
         thesis_figures.FIGURE_3_16,
+        thesis_figures.THESIS_READINGS,
         exploration.TABLE_4_2,
         exploration.TABLE_4_3,
         exploration.EXPLORATION_HAND,

@@ -32,6 +32,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "figure-3.14": ({"shape": ["ellipse"], "noise": ["25"], "particles": ["500", "1000"]}, 4),
     "figure-3.15": ({"shape": ["rectangle"], "constraints": ["0", "4"]}, 6),
     "figure-3.16": ({"shape": ["rectangle"], "noise": ["50"], "method": ["thesis-pf", "particle, no graph"]}, 3),
+    "thesis-readings": ({"noise": ["25"], "shape": ["ellipse"], "part": ["likelihood"]}, 3),
     "table-4.2": ({"candidates": ["10"], "policy": ["information", "clairvoyant"]}, 12),
     "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),

@@ -10,7 +10,6 @@ from gtsam import Pose2, Pose3
 from tactile_lab.evaluation.consistency.levels import CURVE, LEVELS
 from tactile_lab.evaluation.consistency.surfaces import mesh_consistency, outline_consistency, surface_consistency
 
-
 BOX = trimesh.creation.box((0.1, 0.06, 0.04))
 
 
