@@ -1,10 +1,10 @@
 """The readings that the thesis's text allows of its filter: of the gate, of the likelihood, and of the noise.
 
-The gate (section 3.5.1) asks for four close contacts from two successive grasps, and for observability. How close is not
-stated; the four may be those of the new grasp, close to the contacts before or to the surface, or those of both grasps
-together, which are two pairs. Equation 3.9 has a field whose labels are +1 and -1 at a distance that is not stated, with
-one of two kernels, of all grasps (algorithm 3.1) or of the previous one (figure 3.4). Section 3.4.1 has 10 mm and 20
-degrees as standard deviations, section 3.6.2 as magnitudes.
+The gate (section 3.5.1) asks for four close contacts from two successive grasps, and for observability. How close is
+not stated; the four may be those of the new grasp, close to the contacts before or to the surface, or those of both
+grasps together, which are two pairs. Equation 3.9 has a field whose labels are +1 and -1 at a distance that is not
+stated, with one of two kernels, of all grasps (algorithm 3.1) or of the previous one (figure 3.4). Section 3.4.1 has
+10 mm and 20 degrees as standard deviations, section 3.6.2 as magnitudes.
 """
 
 from __future__ import annotations
