@@ -13,6 +13,7 @@ from typing import Any
 
 from drivers.core.errors import SessionError
 from tactile_lab.evaluation.consistency.figures import ConsistencyFigures
+from tactile_lab.evaluation.dimensions import Extent
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, Truth
 from tactile_lab.evaluation.figures import (
     LoopFigures,
@@ -41,6 +42,7 @@ class Evaluation:
         aligned: how the estimate's object frame was aligned with the truth's for ``shape`` and ``pose``.
         shape: errors with that alignment.
         shape_best_fit: errors after the best rigid alignment.
+        dimensions: length, width and, in space, height; None without a shape.
         pose_umeyama: the field's standard trajectory error, see :mod:`tactile_lab.evaluation.standard_error`.
         consistency: whether the stated uncertainties are true, see :mod:`tactile_lab.evaluation.consistency`.
         registration_rms_mm: see :func:`tactile_lab.evaluation.registration.registration_rms_mm`.
@@ -64,6 +66,7 @@ class Evaluation:
     shape: ShapeFigures | None
     shape_best_fit: ShapeFigures | None
     uncertainty: UncertaintyFigures | None
+    dimensions: tuple[Extent, ...] | None
     pose: PoseErrors | None
     pose_umeyama: StandardErrors | None
     consistency: ConsistencyFigures | None

@@ -15,6 +15,7 @@ import numpy as np
 
 from drivers.core.registry import Registry
 from tactile_lab.evaluation.consistency.figures import consistency
+from tactile_lab.evaluation.dimensions import dimensions
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, seen_contacts
 from tactile_lab.evaluation.files.plain import plain
 from tactile_lab.evaluation.loops import wrong_loops
@@ -209,6 +210,7 @@ def _truth(estimate: EstimateWithTruth) -> TruthFigures:
 FIGURES.register("shape", _shape)
 FIGURES.register("shape_best_fit", _shape_best_fit)
 FIGURES.register("uncertainty", _uncertainty)
+FIGURES.register("dimensions", dimensions)
 FIGURES.register("pose", _pose)
 FIGURES.register("pose_umeyama", _pose_umeyama)
 FIGURES.register("consistency", consistency)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,6 +27,7 @@ def evaluation_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
     """Rows from the content of ``evaluation.json``; unknown values show as a dash."""
     rows = [
         *_shape_rows(evaluation.get("shape") or {}, evaluation.get("shape_best_fit") or {}),
+        *_size_rows(evaluation.get("dimensions") or ()),
         *_pose_rows(evaluation.get("pose") or {}),
         _standard_row(evaluation.get("pose_umeyama") or {}),
         *_consistency_rows(evaluation.get("consistency") or {}),
@@ -50,6 +51,18 @@ def _shape_rows(first: Mapping[str, Any], best: Mapping[str, Any]) -> list[Evalu
     return [
         EvaluationRow(label, _text(first.get(key), digits), unit, f"{_text(best.get(key), digits)} at best fit; {note}")
         for key, label, unit, digits, note in _SHAPE
+    ]
+
+
+def _size_rows(extents: Sequence[Mapping[str, Any]]) -> list[EvaluationRow]:
+    return [
+        EvaluationRow(
+            str(extent["name"]).capitalize(),
+            f"{extent['mm']:.1f} \u00b1 {2 * extent['sigma_mm']:.1f}",
+            "mm",
+            f"with two standard deviations; true {_text(extent.get('true_mm'), 1)} mm",
+        )
+        for extent in extents
     ]
 
 

@@ -21,6 +21,7 @@ from tactile_lab.evaluation.files.tables import read_contour
 from tactile_lab.evaluation.files.trajectory_file import read_trajectory
 from tactile_lab.evaluation.shape import horizontal_outline
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, read_truth_mesh
+from tactile_lab.report.camera_picture import last_view
 from tactile_lab.report.content import ReportContent, SessionFacts, Surface, TrueShape, with_plain_lids
 from tactile_lab.report.course import read_course
 from tactile_lab.slam.shape.metrics.alignment import align_contours
@@ -45,6 +46,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
     surface = _surface(folder / "mesh.ply", results.dimension)
     contour_m, sigma_m = _outline(folder, results, surface)
     truth = _truth(session, folder, results)
+    camera, problem = last_view(session, results.trajectory.world_T_object)
     return ReportContent(
         facts=facts(session.manifest),
         results=results,
@@ -55,6 +57,8 @@ def gather(session: Session, folder: Path) -> ReportContent:
         truth=truth,
         fitted_outline_m=_fit(contour_m, truth),
         course=read_course(session),
+        camera=camera,
+        camera_problem=problem,
     )
 
 

@@ -53,7 +53,7 @@ def test_covariances_are_read_back_and_may_be_missing(tmp_path: Path) -> None:
     assert found.covariances[1:] == (None, None)
     assert found.covariances[0] == pytest.approx(covariances[0])
     negative = Trajectory((0.5,), (TRUTH[0],), (-np.eye(6),))
-    with pytest.raises(SessionError, match=r"line 2 .*negative variances"):
+    with pytest.raises(SessionError, match=r"line 2: .*negative variances"):
         read_trajectory(write(tmp_path / "negative.csv", trajectory_text(negative)))
 
 

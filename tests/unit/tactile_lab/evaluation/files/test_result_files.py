@@ -159,7 +159,7 @@ def test_contacts_of_a_grasp_beyond_the_trajectory_are_refused(tmp_path: Path, r
 
 
 def test_contour_file_refuses_words(tmp_path: Path) -> None:
-    (tmp_path / "contour.csv").write_text("x_m,y_m\n1.0,one\n")
+    (tmp_path / "contour.csv").write_text("x_m,y_m\n1.0,one\n1.0,2.0\n")
     with pytest.raises(SessionError, match="not a number"):
         read_contour(tmp_path / "contour.csv")
 
