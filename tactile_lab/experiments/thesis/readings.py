@@ -47,30 +47,33 @@ class Reading:
     noise: float = 1.0
 
 
-_PAIRS = GateSettings(close_to="previous", least_contacts=2, least_eigenvalue=0.0)
-_SURFACE = GateSettings(close_to="surface", distance_m=0.005)
+_GATES = {
+    "four contacts near the previous grasp": GateSettings(close_to="previous"),
+    "two pairs of successive grasps": GateSettings(close_to="previous", least_contacts=2, least_eigenvalue=0.0),
+    "four contacts near any earlier one": GateSettings(close_to="earlier"),
+    "four contacts within 15 mm of the surface": GateSettings(close_to="surface"),
+    "four contacts within 5 mm of the surface": GateSettings(close_to="surface", distance_m=0.005),
+    "no gate": GateSettings(least_contacts=0, least_eigenvalue=0.0),
+}
+_PAIRS, _SURFACE = _GATES["two pairs of successive grasps"], _GATES["four contacts within 5 mm of the surface"]
 
 READINGS: Mapping[str, Mapping[str, Reading]] = {
-    "gate": {
-        "four contacts near the previous grasp": Reading(GateSettings(close_to="previous")),
-        "two pairs of successive grasps": Reading(_PAIRS),
-        "four contacts near any earlier one": Reading(GateSettings(close_to="earlier")),
-        "four contacts within 15 mm of the surface": Reading(GateSettings(close_to="surface")),
-        "four contacts within 5 mm of the surface": Reading(_SURFACE),
-        "no gate": Reading(GateSettings(least_contacts=0, least_eigenvalue=0.0)),
+    "gate, squared exponential kernel": {name: Reading(gate) for name, gate in _GATES.items()},
+    "gate, thin plate kernel": {
+        "two pairs of successive grasps": Reading(_PAIRS, kernel="thin_plate"),
+        "four contacts within 5 mm of the surface": Reading(_SURFACE, kernel="thin_plate"),
+        "no gate": Reading(_GATES["no gate"], kernel="thin_plate"),
     },
     "likelihood": {
-        "labels at 2 mm": Reading(_SURFACE, label_m=0.002),
-        "labels at 10 mm": Reading(_SURFACE, label_m=0.010),
-        "thin plate": Reading(_SURFACE, kernel="thin_plate"),
-        "field of the previous grasp": Reading(_PAIRS, matching="previous"),
+        "labels at 2 mm": Reading(_SURFACE, label_m=0.002, kernel="thin_plate"),
+        "labels at 10 mm": Reading(_SURFACE, label_m=0.010, kernel="thin_plate"),
+        "field of the previous grasp": Reading(_PAIRS, kernel="thin_plate", matching="previous"),
     },
-    "noise": {
-        "three sigma, two pairs": Reading(_PAIRS, noise=_MAGNITUDE),
-        "three sigma, surface": Reading(_SURFACE, noise=_MAGNITUDE),
-    },
+    "noise": {"magnitudes of three sigma": Reading(_SURFACE, kernel="thin_plate", noise=_MAGNITUDE)},
 }
-"""All readings by what they are of, and by name. The last two have one of the two best gates."""
+"""All readings by what they are of, and by name. Labels are at 5 mm where nothing else is said; likelihood and noise have
+the thin plate and the gate of 5 mm, the field of the previous grasp that of the pairs.
+"""
 
 
 def settings_of(reading: Reading, noise: float) -> SlamSettings:
