@@ -96,7 +96,8 @@ def draw_on_picture(
     scale = width / 460
     for kind, points in outlines:
         if (pixels := view.pixels(points)) is not None:
-            chart.path(pixels, kind, closed=True, style=f"stroke-width:{2 * scale:.2f}")
+            for part, width_px in (("casing", 2.6), (kind, 1.3)):  # legible on light and on dark
+                chart.path(pixels, f"seen {part}-seen", closed=True, style=f"stroke-width:{width_px * scale:.2f}")
     dots = view.pixels(contacts_world_m) if len(contacts_world_m) else None
     for dot in dots if dots is not None else ():
         chart.dot(dot, "contact-seen", radius=round(3.2 * scale, 2))

@@ -224,7 +224,7 @@ def _picture_card(content: ReportContent) -> Markup:
     caption = (
         f"The outline is drawn {where}, where the estimated pose places it; thin lines are two standard deviations."
     )
-    keys = legend([("estimate", "estimate"), ("truth", "true outline at the marker's pose"), ("seen", "contacts")])
+    keys = legend([("estimate-seen", "estimate"), ("truth-seen", "truth, by the marker"), ("seen", "contacts")])
     title = f"The camera's picture of grasp {content.camera.grasp + 1}"
     return element("div", figure(picture, caption, title, keys), class_="pair wide")
 

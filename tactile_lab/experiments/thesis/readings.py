@@ -47,11 +47,14 @@ class Reading:
     noise: float = 1.0
 
 
+_NEAR_m = 0.015
 _GATES = {
-    "four contacts near the previous grasp": GateSettings(close_to="previous"),
-    "two pairs of successive grasps": GateSettings(close_to="previous", least_contacts=2, least_eigenvalue=0.0),
-    "four contacts near any earlier one": GateSettings(close_to="earlier"),
-    "four contacts within 15 mm of the surface": GateSettings(close_to="surface"),
+    "four contacts near the previous grasp": GateSettings(close_to="previous", distance_m=_NEAR_m),
+    "two pairs of successive grasps": GateSettings(
+        close_to="previous", distance_m=_NEAR_m, least_contacts=2, least_eigenvalue=0.0
+    ),
+    "four contacts near any earlier one": GateSettings(close_to="earlier", distance_m=_NEAR_m),
+    "four contacts within 15 mm of the surface": GateSettings(close_to="surface", distance_m=_NEAR_m),
     "four contacts within 5 mm of the surface": GateSettings(close_to="surface", distance_m=0.005),
     "no gate": GateSettings(least_contacts=0, least_eigenvalue=0.0),
 }
@@ -71,8 +74,8 @@ READINGS: Mapping[str, Mapping[str, Reading]] = {
     },
     "noise": {"magnitudes of three sigma": Reading(_SURFACE, kernel="thin_plate", noise=_MAGNITUDE)},
 }
-"""All readings by what they are of, and by name. Labels are at 5 mm where nothing else is said; likelihood and noise have
-the thin plate and the gate of 5 mm, the field of the previous grasp that of the pairs.
+"""All readings by what they are of, and by name. Labels are at 5 mm where nothing else is said; likelihood and noise
+have the thin plate and the gate of 5 mm, the field of the previous grasp that of the pairs.
 """
 
 

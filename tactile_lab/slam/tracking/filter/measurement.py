@@ -57,7 +57,8 @@ class Measurement(Protocol):
 
 
 class GateSettings(StrictModel):
-    """The gate of section 3.5.1; the thesis gives the number of contacts, the other values are this program's.
+    """The gate of section 3.5.1 in the reading under which the thesis's filter does best (experiment
+    ``thesis-readings``, decision 50); the thesis gives the number of contacts, the other values are this program's.
 
     Attributes:
         least_contacts: number of contacts that must be close to the reference.
@@ -69,8 +70,8 @@ class GateSettings(StrictModel):
     """
 
     least_contacts: int = Limit(default=4, ge=0)
-    close_to: Literal["previous", "earlier", "surface"] = "previous"
-    distance_m: float = Limit(default=0.015, gt=0)
+    close_to: Literal["previous", "earlier", "surface"] = "surface"
+    distance_m: float = Limit(default=0.005, gt=0)
     normal_angle_rad: float = Limit(default=float(np.deg2rad(40.0)), gt=0)
     least_eigenvalue: float = Limit(default=0.15, ge=0)
 
