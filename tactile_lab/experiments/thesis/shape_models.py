@@ -60,8 +60,8 @@ def _fitted(data: planar_data.PlanarGrasps | spatial_data.SpatialGrasps, cell: C
     sets = [ContactSet.of_grasp(grasp, dimension, 0.0) for grasp in data.grasps]
     contacts = ContactSet.concatenate(sets).select(np.arange(cell["contacts"]))
     model = cell["model"]
-    given = {"observations": "offsurface", "kernel": OFF_SURFACE[model], "prior_mean": "zero"}
-    settings = GpisSettings.model_validate(given) if model in OFF_SURFACE else GpisSettings()
+    off_surface = {"observations": "offsurface", "kernel": OFF_SURFACE.get(model), "prior_mean": "zero"}
+    settings = GpisSettings.model_validate(off_surface) if model in OFF_SURFACE else GpisSettings()
     columns = (contacts.points_m, contacts.normals, contacts.point_sigma_m, contacts.normal_sigma_rad)
     field = Gpis.fit(*columns, settings).optimise(max_iterations=_KERNEL_STEPS)
     return fit_shape(OTHERS.get(model, "gpis"), field)
