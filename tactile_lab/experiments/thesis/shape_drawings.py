@@ -18,12 +18,13 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.metrics.metrics import contour_errors, mesh_errors
 from tactile_lab.slam.shape.selection.models import fit_shape
-from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon, sample_polygon
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 
 _KERNEL_STEPS = 30
 _DRAWN_STEP_m = 0.001
 _MESH_STEP_m = 0.004
+_BESIDE_m = 0.010
 _MANY = 160
 _ONE_SIDE = 12
 _FACING = 0.1
@@ -113,20 +114,22 @@ def _drawn_outline(contacts: ContactSet, model: str, truth_m: Array) -> dict[str
         )
         outline_m = shape.contour().points_m
     except ShapeError:
-        return {"hausdorff_mm": None, "mean_mm": None, "touched_mm": None, "drawing": drawing}
+        return {"hausdorff_mm": None, "mean_mm": None, "beside_mm": None, "drawing": drawing}
     errors = contour_errors(outline_m, truth_m)
     drawing["estimate"] = millimetres(sample_polygon(outline_m, _DRAWN_STEP_m))
     return {
         "hausdorff_mm": 1e3 * errors.hausdorff_m,
         "mean_mm": 1e3 * errors.mean_distance_m,
-        "touched_mm": 1e3 * _largest_beside(contacts.points_m, outline_m),
+        "beside_mm": 1e3 * _largest_beside(contacts.points_m, outline_m, truth_m),
         "drawing": drawing,
     }
 
 
-def _largest_beside(points_m: Array, outline_m: Array) -> float:
-    """Largest distance of a contact from the outline."""
-    return float(np.linalg.norm(points_m[:, None] - sample_polygon(outline_m, 0.0005)[None], axis=2).min(axis=1).max())
+def _largest_beside(points_m: Array, outline_m: Array, truth_m: Array) -> float:
+    """Largest distance of the true outline beside a contact from the estimated one."""
+    true_m = sample_polygon(truth_m, _DRAWN_STEP_m)
+    beside = np.linalg.norm(true_m[:, None] - points_m[None], axis=2).min(axis=1) < _BESIDE_m
+    return float(distances_to_polygon(true_m[beside], outline_m).max()) if beside.any() else 0.0
 
 
 def _drawn_section(contacts: ContactSet, model: str, data: spatial_data.SpatialGrasps) -> dict[str, Any]:
