@@ -12,7 +12,7 @@ from drivers.core.contacts import FINGERS
 from tactile_lab.view.scene import Scene
 
 _COLOURS = ("#1d5fa8", "#c2570c", "#1a8f6a", "#8a4fbf", "#b3261e")
-_DASHES = ([], [8, 3], [2, 3], [9, 3, 2, 3], [14, 4])
+_DASHES: tuple[list[int], ...] = ([], [8, 3], [2, 3], [9, 3, 2, 3], [14, 4])
 """Lines differ in dashes as well as in colour, so that they can be told apart in grey."""
 _HEIGHT_px = 170
 _WIDEST_px = 640

@@ -20,7 +20,7 @@ KERNELS = ("SE kernel", "TP kernel")
 _TRUTH = "true"
 _ERRORS = (HAUSDORFF, MEAN_DISTANCE)
 _BESIDE = Column("within 10 mm of contacts, mm", "beside_mm")
-"""Of a shape that is touched on one side, the Hausdorff distance there; the rest is cut off 60 mm beyond the contacts."""
+"""Of a shape that is touched on one side only: elsewhere it is open, and cut off 60 mm beyond the contacts."""
 
 
 def drawings(panel_of: Callable[[Cell], str], line: str, *, columns: int = 3) -> PlotOf:
