@@ -79,12 +79,17 @@ class EstimateWithTruth:
         """Order of that symmetry; None if there is none or the true shape is unknown."""
         return None if self.symmetry is None else self.symmetry.order
 
+    @property
+    def poses_modulo_symmetry(self) -> tuple[Pose3 | None, ...]:
+        """The estimated poses, turned by symmetries of the object towards the true heading."""
+        centre_m = ORIGIN_m if self.symmetry is None else self.symmetry.centre_m
+        return modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns, centre_m)
+
     @cached_property
     def registration_rms_mm(self) -> float | None:
         """See :func:`tactile_lab.evaluation.registration.registration_rms_mm`; rotations of symmetry do not count."""
         points = [rows.points_world_m for rows in self.results.contacts]
-        centre_m = ORIGIN_m if self.symmetry is None else self.symmetry.centre_m
-        told = modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns, centre_m)
+        told = self.poses_modulo_symmetry
         return registration_rms_mm(points, told, self.truth.world_T_object, self.results.dimension)
 
     @cached_property
@@ -103,7 +108,7 @@ class EstimateWithTruth:
             mesh = self.truth.mesh
             return (None, ()) if mesh is None else _surface(self.folder / name, mesh, truth_T_estimate)
         outline = true_outline(self.results, self.truth)
-        estimate = read_contour(self.folder / name)[:-1]
+        estimate = read_contour(self.folder / name).points_m
         return None if outline is None else compare_contour(estimate, outline, truth_T_estimate), ()
 
 

@@ -14,6 +14,7 @@ from tactile_lab.experiments.studies import (
     laboratory,
     planar,
     solids,
+    thesis_drawings,
     thesis_figures,
 )
 
@@ -36,6 +37,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         thesis_figures.FIGURE_3_14,
         thesis_figures.FIGURE_3_15,
         thesis_figures.FIGURE_3_16,
+        thesis_figures.THESIS_READINGS,
+        *thesis_drawings.ALL,
         exploration.TABLE_4_2,
         exploration.TABLE_4_3,
         exploration.EXPLORATION_HAND,

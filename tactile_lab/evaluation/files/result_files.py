@@ -1,9 +1,9 @@
 """The files that a session's SLAM writes to ``results/``.
 
 ==================  ===============================================================================
-``trajectory.csv``  stamp and 16 entries of ``world_T_object`` a grasp; empty where not placed
+``trajectory.csv``  stamp, 16 entries of ``world_T_object`` and its covariance a grasp; empty where not placed
 ``contacts.csv``    every contact in the world frame, with its grasp, finger, force and uncertainty
-``contour.csv``     dimension 2: the outer contour in the object frame, closed
+``contour.csv``     dimension 2: the outer contour in the object frame, closed, with its standard deviation
 ``mesh.ply/.glb``   the shape in the object frame with per-vertex ``sigma_m``; in dimension 2 the contour
                     extruded from the table to the highest contact
 ``known.csv/.ply``  on wish: the parts of the contour or surface whose standard deviation is small enough
@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array, Grasp
+from tactile_lab.evaluation.consistency.pose_covariance import covariances_in_world
 from tactile_lab.evaluation.files.mesh_io import write_glb, write_ply
 from tactile_lab.evaluation.files.plain import json_text, plain
 from tactile_lab.evaluation.files.tables import NANOSECOND_s, contacts_text, contour_text, pieces_text
+from tactile_lab.evaluation.files.trajectory_file import Trajectory, trajectory_text
 from tactile_lab.evaluation.prism import Triangles, open_ring, prism
-from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.slam.result import SlamResult, SlamStep
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, supported_mesh, supported_pieces
 
@@ -58,10 +59,11 @@ def write_results(
         WriteError: the folder cannot be written.
     """
     stamps_s = tuple(grasp.stamp_ns * NANOSECOND_s for grasp in grasps)
+    trajectory = Trajectory(stamps_s, tuple(result.world_T_object), covariances_in_world(result))
     texts = {
-        "trajectory.csv": trajectory_text(Trajectory(stamps_s, tuple(result.world_T_object))),
+        "trajectory.csv": trajectory_text(trajectory),
         "contacts.csv": contacts_text(grasps),
-        **({} if result.contour is None else {"contour.csv": contour_text(result.contour.points_m)}),
+        **({} if result.contour is None else {"contour.csv": _contour_text(result.contour)}),
         **_known_contour(result, largest_sigma_m),
         "slam.json": json_text(_slam_record(result, settings or {})),
         "timing.json": json_text({"schema_version": SCHEMA_VERSION, "step_seconds": result.step_seconds}),
@@ -120,6 +122,11 @@ def _ring_of(contour: Contour) -> tuple[Array, NDArray[np.intp]]:
     return ring, np.argmin(np.sum((ring[:, None] - contour.points_m[None]) ** 2, axis=2), axis=1)
 
 
+def _contour_text(contour: Contour) -> str:
+    ring, nearest = _ring_of(contour)
+    return contour_text(ring, contour.sigma_m[nearest], None if contour.known is None else contour.known[nearest])
+
+
 def _vertex_normals(vertices: Array, faces: Triangles) -> Array:
     """Area weighted mean normals of the faces at each vertex, shape (n, 3)."""
     corners = vertices[faces]
@@ -146,17 +153,7 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "common_covariances": result.common_covariances,
         "loops": result.loops,
         "sigma_quantiles_m": _sigma_quantiles(result),
-        **_along_contour(result.contour),
     }
-
-
-def _along_contour(contour: Contour | None) -> dict[str, Any]:
-    """Standard deviation and whether it was touched, at each point of ``contour.csv``."""
-    if contour is None:
-        return {"contour_sigma_m": None, "contour_known": None}
-    _, nearest = _ring_of(contour)
-    known = None if contour.known is None else contour.known[nearest]
-    return {"contour_sigma_m": contour.sigma_m[nearest], "contour_known": known}
 
 
 def _sigma_quantiles(result: SlamResult) -> Array | None:

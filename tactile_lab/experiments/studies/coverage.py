@@ -16,7 +16,7 @@ from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.run_metrics import slam_figures
-from tactile_lab.experiments.studies.columns import COVERED, REGISTRATION
+from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, SURFACE_INSIDE
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.experiments.summary import Column
 from tactile_lab.slam.result import SlamResult
@@ -115,7 +115,9 @@ COVERAGE = Experiment(
     assessed_run,
     (
         REGISTRATION,
-        COVERED,
+        POSES_INSIDE,
+        Column("in the common frame", "common_poses_inside", 0, kind="shares"),
+        SURFACE_INSIDE,
         Column("touched", "known_share", 0, kind="percent"),
         Column("off by 5 mm or 5 sigma", "off", 0, kind="sum"),
         Column("of these told", "off_told", 0, kind="sum"),
