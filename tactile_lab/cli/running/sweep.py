@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, METHOD_HELP, MOST_GRASPS, MOST_JOBS, Json, Method, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, MOST_JOBS, Json, MethodName, NoInput, RigName
 
 
 def sweep(
     objects: Annotated[str, typer.Option(help="Comma-separated object names, or 'all'.")] = "all",
     seeds: Annotated[str, typer.Option(help="Comma-separated random seeds.")] = "1,2,3",
     dimensions: Annotated[str, typer.Option(help="Comma-separated dimensions: 2, 3 or 2,3.")] = "2,3",
-    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
+    method: MethodName = "joint",
     grasps: Annotated[int, typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps per session.")] = 16,
     rig: RigName = "sim",
     jobs: Annotated[int, typer.Option(min=1, max=MOST_JOBS, help="Number of parallel sessions.")] = 2,
@@ -44,7 +44,7 @@ def sweep(
     chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
     drawn = _numbers(seeds, "--seeds", largest=LARGEST_SEED)
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
-    cells = [cell_of(run, rig, str(method), grasps, check_replay) for run in runs]
+    cells = [cell_of(run, rig, method, grasps, check_replay) for run in runs]
     work = partial(run_sweep_cell, root=out)
     done = run_cells(
         "sweep", cells, work, out / LINES_FILE, RunnerSettings(jobs), lambda row, *_: say(row_of(row).line())
