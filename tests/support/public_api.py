@@ -19,8 +19,9 @@ from tests.support.repository import REPOSITORY
 PAGE = REPOSITORY / "docs" / "library-reference.md"
 _HEAD = """# Reference of the library
 
-Everything that `from tactile_lab import ...` gives, made by `python -m tests.support.public_api` from the code. These
-names keep their signatures as [the contributing guide](../CONTRIBUTING.md#versions) says; [the library](library.md) shows how they are used.
+Everything that `from tactile_lab import ...` gives, made by `python -m tests.support.public_api` from the code.
+These names keep their signatures as [the contributing guide](../CONTRIBUTING.md#versions) says;
+[the library](library.md) shows how they are used.
 """
 
 
@@ -35,7 +36,8 @@ def _section(name: str, item: Any) -> str:
     if name == "__version__":
         return f"\n## `{name}`\n\nThe version, as text.\n"
     if isinstance(item, Registry):
-        return f"\n## `{name}`\n\nThe registry of every {item.kind}: {', '.join(f'`{one}`' for one in item.registered())}.\n"
+        entries = ", ".join(f"`{one}`" for one in item.registered())
+        return f"\n## `{name}`\n\nThe registry of every {item.kind}: {entries}.\n"
     lines = [f"\n## `{name}`\n", f"`{_signature(name, item)}`\n", f"{_summary(item)}\n"]
     members = [_member(one, member) for one, member in _members(item)]
     return "\n".join([*lines, *(["\n".join(members) + "\n"] if members else [])])

@@ -59,9 +59,8 @@ def test_a_recorded_session_through_three_methods(
     variables, printed, shown = run("three-methods")
     assert set(variables["finished"]) == {"odometry", "icp", "joint"}
     assert printed.count("\n") == 3
-    assert shown[-1]._repr_svg_().count("<polygon") == len(
-        [file for file in variables["found"].values() if file.is_file()]
-    )
+    outlines = [file for file in variables["found"].values() if file.is_file()]
+    assert shown[-1]._repr_svg_().count("<polygon") == len(outlines) > 0
 
 
 def test_a_new_policy_on_simulated_sessions(monkeypatch: pytest.MonkeyPatch) -> None:
