@@ -43,7 +43,8 @@ if TYPE_CHECKING:
     from tactile_lab.slam.shape.selection.models import SHAPE_MODELS
     from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
     from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-    from tactile_lab.slam.tracking.trackers import METHODS, Tracker, TrackerStart
+    from tactile_lab.slam.tracking.tracker import Tracker
+    from tactile_lab.slam.tracking.trackers import METHODS, TrackerStart
     from tactile_lab.workflow.exporters import EXPORTERS
     from tactile_lab.workflow.finishing import FinishedSession
     from tactile_lab.workflow.reconstructing import Wishes, reconstruct
@@ -82,7 +83,7 @@ _PLACES = {
     "SurfaceMesh": "tactile_lab.slam.shape.surfaces.surface",
     "TactileLabError": "drivers.core.errors",
     "TactileSlam": "tactile_lab.slam.tactile_slam",
-    "Tracker": "tactile_lab.slam.tracking.trackers",
+    "Tracker": "tactile_lab.slam.tracking.tracker",
     "TrackerStart": "tactile_lab.slam.tracking.trackers",
     "TrackingError": "drivers.core.errors",
     "WIRES": "drivers.fingertips.kinds",

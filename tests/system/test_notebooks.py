@@ -19,7 +19,7 @@ NOTEBOOKS = REPOSITORY / "docs" / "notebooks"
 
 def run(name: str) -> tuple[dict[str, Any], str, list[Any]]:
     """Run every code cell. Returns the variables, what was printed, and the values that cells end with."""
-    variables: dict[str, Any] = {"__name__": name}
+    variables: dict[str, Any] = {"__name__": "__main__"}
     shown: list[Any] = []
     with redirect_stdout(StringIO()) as printed:
         for cell in json.loads((NOTEBOOKS / f"{name}.ipynb").read_text())["cells"]:

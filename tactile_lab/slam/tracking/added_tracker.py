@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from drivers.core.contacts import Array
     from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
     from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-    from tactile_lab.slam.tracking.trackers import Tracker
+    from tactile_lab.slam.tracking.tracker import Tracker
 
 
 class AddedTracker:

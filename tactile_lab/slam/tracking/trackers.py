@@ -1,10 +1,10 @@
-"""The trackers behind one interface, and their settings."""
+"""The trackers by name, and their settings."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, Protocol, Self, TypeAlias
+from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
 from gtsam import Pose3
@@ -12,7 +12,6 @@ from pydantic import AfterValidator, model_validator
 from pydantic import Field as Limit
 
 from drivers.core.configuration import StrictModel
-from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.registry import Registry
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
@@ -21,7 +20,6 @@ from tactile_lab.slam.tracking.added_tracker import AddedTracker
 from tactile_lab.slam.tracking.baselines.icp_tracker import IcpSettings, IcpTracker
 from tactile_lab.slam.tracking.baselines.odometry_tracker import KnownPoseTracker, OdometryTracker
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 from tactile_lab.slam.tracking.contacts.spatial_pose_vectors import SPATIAL
@@ -32,11 +30,11 @@ from tactile_lab.slam.tracking.filter.measurement import (
     Measurement,
     ThesisMeasurement,
 )
-from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 from tactile_lab.slam.tracking.filter.particle_tracker import ParticleTracker
 from tactile_lab.slam.tracking.joint.deferred_association import Relocate
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.settings import JointSettings
+from tactile_lab.slam.tracking.tracker import Tracker
 
 GRID_MARGIN_m = 0.040
 
@@ -47,43 +45,6 @@ GRAPH_METHODS: tuple[str, ...] = ("particle", "thesis-pf-graph")
 
 THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="squared_exponential", prior_mean="zero")
 """The thesis's shape model (section 2.2)."""
-
-
-class Tracker(Protocol):
-    """Follows the object from grasp to grasp; the calls of one step come in this order."""
-
-    @property
-    def effective_count(self) -> float:
-        """Effective number of particles or hypotheses after the last weighting."""
-
-    @property
-    def map(self) -> ContactMap:
-        """All grasps so far with their present poses."""
-
-    @property
-    def refined(self) -> ContactMap:
-        """The same with refinements that take too long for every step, for the shape shown between grasps."""
-
-    def predict(self, motion: Array) -> None:
-        """Move the belief by the hand's motion (eq. 3.7)."""
-
-    def weigh(self, contacts: ContactSet) -> bool:
-        """Weight the belief by a grasp's contacts in the world (eq. 3.6); returns False if nothing fits."""
-
-    def estimate(self) -> PoseEstimate:
-        """The present pose."""
-
-    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
-        """Add the grasp to the map. A tracker with one hypothesis keeps uncertain contacts out of the shape."""
-
-    def resample(self) -> None:
-        """Concentrate the belief on likely states."""
-
-    def adopt(self, corrected: ContactMap) -> None:
-        """Take over a map whose poses were corrected from outside."""
-
-    def finish(self) -> None:
-        """No further grasp follows: final estimation from all of them."""
 
 
 @dataclass(frozen=True)
