@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class AddedTracker:
-    """A :class:`~tactile_lab.slam.tracking.trackers.Tracker` around one that is not ours.
+    """A :class:`~tactile_lab.slam.tracking.tracker.Tracker` around one that is not ours.
 
     Args:
         method: its name.
