@@ -19,15 +19,20 @@ def check_own_packages() -> None:
 
     Raises:
         ImportError: something else has the name; says which file, in one sentence.
+        SystemExit: the same, for ``python -m``.
     """
     home = Path(__file__).resolve().parents[1]
     for name in PACKAGES:
         ours, found = home / name / "__init__.py", _origin(name)
         if ours.is_file() and found != ours:
-            what = f"{found} hides" if found else "something else hides"
-            raise ImportError(
-                f"{what} the package {name!r} of tactile-lab: rename it, or start Python in another folder"
-            )
+            hidden = f"{found or 'something else'} hides the package {name!r} of tactile-lab"
+            _refuse(f"{hidden}: rename it, or start Python in another folder")
+
+
+def _refuse(sentence: str) -> None:
+    if sys.argv[:1] == ["-m"]:  # python -m tactile_lab: a person, who needs no traceback
+        sys.exit(f"error: {sentence}")
+    raise ImportError(sentence)
 
 
 def _origin(name: str) -> Path | None:

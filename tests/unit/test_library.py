@@ -70,6 +70,9 @@ def test_a_users_own_file_with_a_name_of_ours_is_named_in_one_sentence(tmp_path:
     package = hiding.partition("/")[0].removesuffix(".py")
     wanted = f"ImportError: {file} hides the package '{package}' of tactile-lab: rename it, or start Python in another"
     assert done.stderr.splitlines()[-1] == f"{wanted} folder"
+    words = [sys.executable, "-m", "tactile_lab", "--version"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, f"{wanted.replace('ImportError', 'error')} folder\n")
 
 
 def test_a_users_own_folder_of_recordings_does_no_harm(tmp_path: Path) -> None:
