@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.core.errors import WriteError
+from drivers.core.atomic_files import write_whole
 from tactile_lab.experiments.cells import Row
 from tactile_lab.experiments.execution.source_version import version
 
@@ -32,15 +32,9 @@ def write_parquet(path: Path, name: str, rows: Sequence[Row]) -> None:
     records = [_plain(row) for row in rows]
     table = pyarrow.table({column: [record.get(column) for record in records] for column in columns})
     table = table.replace_schema_metadata({"experiment": name, "version": version()})
-    part = path.with_name(f".{path.name}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        parquet.write_table(table, part)
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        what = f"cannot be written ({error.strerror or error})"
-        raise WriteError(what, where=str(path), hint="Choose another file with --parquet") from error
+    buffer = pyarrow.BufferOutputStream()
+    parquet.write_table(table, buffer)
+    write_whole(path, buffer.getvalue().to_pybytes(), "Choose another file with --parquet")
 
 
 def _plain(row: Row) -> dict[str, Any]:

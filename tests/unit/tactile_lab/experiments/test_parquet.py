@@ -26,12 +26,16 @@ def test_every_run_is_a_row_with_its_setting_and_figures(tmp_path: Path) -> None
     file = tmp_path / "new" / "runs.parquet"
     write_parquet(file, "test", ROWS)
     table = parquet.read_table(file)
-    assert table.to_pylist() == [
-        {"object": "box", "noise": 50, "seed": 3, "failure": "", "shape.hausdorff_mm": 1.0, "shape.ok": True, "status": None},
-        {"object": "box", "noise": 50, "seed": 4, "failure": "", "shape.hausdorff_mm": 1.5, "shape.ok": False, "status": "ok"},
-        {"object": "box", "noise": 50, "seed": 5, "failure": "nothing fits", "shape.hausdorff_mm": None, "shape.ok": None,
-         "status": None},
-    ]  # fmt: skip
+    columns = table.to_pydict()
+    assert columns == {
+        "object": ["box"] * 3,
+        "noise": [50] * 3,
+        "seed": [3, 4, 5],
+        "failure": ["", "", "nothing fits"],
+        "shape.hausdorff_mm": [1.0, 1.5, None],
+        "shape.ok": [True, False, None],
+        "status": [None, "ok", None],
+    }
     assert table.schema.metadata[b"experiment"] == b"test"
     assert table.schema.metadata[b"version"] == version().encode()
     assert [path.name for path in file.parent.iterdir()] == ["runs.parquet"]
@@ -39,7 +43,7 @@ def test_every_run_is_a_row_with_its_setting_and_figures(tmp_path: Path) -> None
 
 def test_a_table_that_cannot_be_written_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(WriteError, match=r"cannot be written .*--parquet"):
+    with pytest.raises(WriteError, match="--parquet"):
         write_parquet(tmp_path / "file" / "runs.parquet", "test", ROWS)
 
 
