@@ -98,7 +98,7 @@ class TruthFigures:
 Figure: TypeAlias = Callable[[EstimateWithTruth], Any]
 """Computes a metric: a number, or anything else that :func:`tactile_lab.evaluation.files.plain.plain` can write."""
 
-FIGURES: Registry[Figure] = Registry("evaluation figure")
+FIGURES: Registry[Figure] = Registry("evaluation figure", group="figures")
 """All metrics by their name in ``evaluation.json``. See ``docs/extending.md`` for adding one."""
 
 

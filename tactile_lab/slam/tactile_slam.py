@@ -46,10 +46,10 @@ from tactile_lab.slam.tracking.contacts.first_pose import first_row
 from tactile_lab.slam.tracking.filter.particle_filter import CERTAIN_VARIANCE, PoseEstimate
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanism
+from tactile_lab.slam.tracking.tracker import Tracker
 from tactile_lab.slam.tracking.trackers import (
     GRAPH_METHODS,
     THESIS_METHODS,
-    Tracker,
     TrackingSettings,
     make_tracker,
     poses_to_be_told,
