@@ -2,51 +2,48 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from mcap.writer import Writer
 
-from drivers.core.errors import SessionError
 from tactile_lab.viewers.encoded import Encoded, Topic
+from tactile_lab.viewers.foxglove_messages import FoxgloveMessages
+from tactile_lab.viewers.new_files import new_file
+from tactile_lab.viewers.recorded_items import RecordedItems
 from tactile_lab.viewers.robot import Robot
 from tactile_lab.viewers.urdf import urdf
 
 DESCRIPTION_FILE = "robot.urdf"
 
 
-def write_foxglove(path: Path, robot: Robot, messages: Iterable[Encoded], facts: dict[str, object]) -> int:
-    """Write a new file; one that cannot be completed is removed. Returns the number of messages.
+def write_foxglove(path: Path, items: RecordedItems, facts: Mapping[str, str]) -> int:
+    """Write a new file; nothing is left of one that cannot be completed. Returns the number of messages.
 
     Args:
-        robot: its description is attached as ``robot.urdf``.
-        messages: in their order.
+        items: of a session; its robot's description is attached as ``robot.urdf``.
         facts: about the session, stored as metadata.
 
     Raises:
         SessionError: the file exists or cannot be written.
     """
-    if path.exists():
-        raise SessionError("exists already", where=str(path), hint="Choose another name")
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        with partial.open("wb") as file:
-            count = _McapFile(Writer(file), robot, facts).write(messages)
-        partial.replace(path)
-    except OSError as error:
-        what = f"cannot be written ({error.strerror or error})"
-        raise SessionError(what, where=str(path), hint="Choose another name") from error
-    finally:
-        if partial.exists():
-            partial.unlink()
-    return count
+    with new_file(path) as partial, partial.open("wb") as file:
+        return _McapFile(Writer(file), items.robot, facts).write(foxglove_messages(items))
+
+
+def foxglove_messages(items: RecordedItems) -> Iterator[Encoded]:
+    """The messages of a session, in their order."""
+    make, begun = FoxgloveMessages(items.robot), False
+    for item in items:
+        if not begun:
+            yield from make.begin(item.stamp_ns)
+            begun = True
+        yield from make.of(item)
 
 
 class _McapFile:
-    def __init__(self, writer: Writer, robot: Robot, facts: dict[str, object]) -> None:
-        self._writer, self._robot = writer, robot
-        self._facts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in facts.items()}
+    def __init__(self, writer: Writer, robot: Robot, facts: Mapping[str, str]) -> None:
+        self._writer, self._robot, self._facts = writer, robot, dict(facts)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 

@@ -5,7 +5,7 @@ Two of ROS's types go with them, for which Foxglove has none: wrenches, and the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -66,21 +66,12 @@ class FoxgloveMessages:
 
     def of(self, item: Item) -> Iterator[Encoded]:
         """The messages of one item."""
+        if isinstance(item, SensorWrench):
+            data = cdr.wrench_stamped(item.stamp_ns, item.frame, item.force_N, item.torque_Nm)
+            yield Encoded(_wrench_topic(item.finger), item.stamp_ns, data)
+            return
         for name, message, key in _MAKERS[type(item)](item):
             yield Encoded(_topic(name, type(message)), item.stamp_ns, message.encode(), key)
-
-    def of_wrench(self, item: SensorWrench) -> Encoded:
-        """A wrench, as ROS has it."""
-        data = cdr.wrench_stamped(item.stamp_ns, item.frame, item.force_N, item.torque_Nm)
-        return Encoded(_wrench_topic(item.finger), item.stamp_ns, data)
-
-    def messages(self, items: Iterable[Item]) -> Iterator[Encoded]:
-        """The messages of items, in their order."""
-        for item in items:
-            if isinstance(item, SensorWrench):
-                yield self.of_wrench(item)
-            else:
-                yield from self.of(item)
 
 
 DESCRIPTION = Topic("/robot_description", "cdr", Schema("std_msgs/msg/String", "ros2msg", cdr.STRING.encode()))
@@ -194,7 +185,7 @@ def _candidates(item: Candidates) -> Made:
         place, ahead = np.array(one.world_T_grasp.translation()), one.world_T_grasp.rotation().matrix()[:, 0]
         arrows.append(_arrow(place, ahead, _CANDIDATE_m, _CHOSEN if one.chosen else _CANDIDATE))
         if one.chosen:
-            above = Pose3(Rot3(), place + [0.0, 0.0, 0.05])
+            above = Pose3(Rot3(), place + np.array([0.0, 0.0, 0.05]))
             label = fm.TextPrimitive(
                 pose=_pose(above), billboard=True, font_size=0.008, color=_colour(_CHOSEN), text=item.text
             )
@@ -206,9 +197,7 @@ def _candidates(item: Candidates) -> Made:
 
 
 def _picture(item: Picture) -> Made:
-    image = fm.CompressedImage(
-        timestamp=_time(item.stamp_ns), frame_id=CAMERA, data=item.encoded, format=item.kind
-    )
+    image = fm.CompressedImage(timestamp=_time(item.stamp_ns), frame_id=CAMERA, data=item.encoded, format=item.kind)
     yield "/camera/image", image, ""
 
 
@@ -258,7 +247,9 @@ def _link(stamp_ns: int, link: str, solids: Sequence[Part]) -> Any:
     cubes, spheres, cylinders = [], [], []
     for part in solids:
         if isinstance(part, BoxPart):
-            cubes.append(fm.CubePrimitive(pose=_pose(part.link_T_part), size=_vector(part.size_m), color=_colour(colour)))
+            cubes.append(
+                fm.CubePrimitive(pose=_pose(part.link_T_part), size=_vector(part.size_m), color=_colour(colour))
+            )
         elif isinstance(part, EllipsoidPart):
             spheres.append(_sphere(part.link_T_part, 2 * np.array(part.semi_axes_m), colour))
         else:
@@ -321,9 +312,7 @@ def _entity(
 
 
 def _deletion(stamp_ns: int, name: str) -> Any:
-    return fm.SceneEntityDeletion(
-        timestamp=_time(stamp_ns), type=fm.SceneEntityDeletionType.MatchingId, id=name
-    )
+    return fm.SceneEntityDeletion(timestamp=_time(stamp_ns), type=fm.SceneEntityDeletionType.MatchingId, id=name)
 
 
 def _cloud(stamp_ns: int, frame: str, columns: Mapping[str, Array], colours: Any = None) -> Any:

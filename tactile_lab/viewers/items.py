@@ -176,17 +176,7 @@ class Remark:
 
 
 Item: TypeAlias = (
-    Frames
-    | Joints
-    | Loads
-    | SensorWrench
-    | Touches
-    | Surface
-    | ObjectPose
-    | Candidates
-    | Picture
-    | Lens
-    | Remark
+    Frames | Joints | Loads | SensorWrench | Touches | Surface | ObjectPose | Candidates | Picture | Lens | Remark
 )
 
 Plain: TypeAlias = dict[str, Any]

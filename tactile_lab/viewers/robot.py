@@ -1,6 +1,6 @@
 """The robot as other programs know it: a tree of named frames from the world to the fingertips, with its shapes.
 
-Joints and links of the hand have the names of Shadow's own description (``rh_FFJ3`` turns ``rh_ffproximal``; ``lh_`` for
+Joints and links of the hand have Shadow's own names (``rh_FFJ3`` turns ``rh_ffproximal``; ``lh_`` for
 a left hand). The positioner is a chain of its six coordinates, whatever arm moves it (see
 :mod:`drivers.positioner.kinematics`).
 """
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -38,7 +39,11 @@ _LINKS = {
     "THJ3": "thhub",
     "THJ2": "thmiddle",
     "THJ1": "thdistal",
-    **{f"{finger}{joint}": finger.lower() + link for finger in ("FF", "MF", "RF", "LF") for joint, link in _FINGER_LINKS.items()},
+    **{
+        f"{finger}{joint}": finger.lower() + link
+        for finger in ("FF", "MF", "RF", "LF")
+        for joint, link in _FINGER_LINKS.items()
+    },
 }
 """Name of each joint's child link in Shadow's description, without the hand's prefix."""
 
@@ -128,10 +133,11 @@ class Robot:
         """
         hand = {self.prefix + name: float(q) for name, q in zip(JOINTS, joints_rad, strict=True)}
         base = {name: float(q) for name, q in zip(POSITIONER_JOINTS, base_q, strict=True)}
-        return {name: q for name, q in {**hand, **base}.items() if name in self._moving_names}
+        return {name: q for name, q in {**hand, **base}.items() if name in self.moving_joints}
 
-    @property
-    def _moving_names(self) -> frozenset[str]:
+    @cached_property
+    def moving_joints(self) -> frozenset[str]:
+        """Names of the joints that move."""
         return frozenset(one.name for one in self.joints if one.kind != "fixed")
 
     def distal_link(self, finger: str) -> str:

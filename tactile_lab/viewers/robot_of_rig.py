@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+from gtsam import Pose3, Rot3
+
 from calibration.forearm.placement import load_forearm
 from calibration.steps.geometry import KnownGeometry
 from drivers.core.configuration import load_model
 from drivers.core.errors import ConfigurationError
 from drivers.fingertips.kind import FingertipKind
 from drivers.shadow.closing.posture import TipEllipsoid
-from gtsam import Pose3, Rot3
-import numpy as np
 from tactile_lab.rigs.build import fitted_tips
 from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.wired import hand_form
 from tactile_lab.viewers.robot import Robot, Tip, make_robot
-from typing import Any
 
 _TABLE_m = (0.6, 0.6, 0.02)
 """Shown where the rig does not describe its table."""

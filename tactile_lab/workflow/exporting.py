@@ -1,4 +1,4 @@
-"""A session as a contact log, for other programs and for :mod:`tactile_lab.workflow.reconstructing`."""
+"""A session as files of other programs; as a contact log also for :mod:`tactile_lab.workflow.reconstructing`."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from sessions.recording.session import Session
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.viewers.packages import require_package
 from tactile_lab.workflow.replaying import recorded_slam, true_poses
 
 
@@ -117,10 +118,38 @@ def export_hdf5(session: Session, path: Path) -> int:
 
 
 def export_rosbag(session: Session, folder: Path) -> int:
-    """All samples as a ROS 2 bag; gives their number. Raises SessionError, or ConfigurationError without rosbags."""
-    from sessions.exchange.ros_bag import write_ros_bag
+    """Frames, markers and all samples as a ROS 2 bag; gives its messages. Raises SessionError, or ConfigurationError
+    without rosbags.
+    """
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.ros_bag import write_ros_bag
 
-    return write_ros_bag(_tables(session), folder)
+    items = RecordedItems(session)
+    return write_ros_bag(folder, items.robot, items, _tables(session))
+
+
+def export_foxglove(session: Session, path: Path) -> int:
+    """What viewers show as an MCAP file of Foxglove's types; gives its messages. Raises SessionError, or
+    ConfigurationError without foxglove-sdk.
+    """
+    require_package("foxglove", "export")
+    from tactile_lab.viewers.foxglove_file import write_foxglove
+    from tactile_lab.viewers.recorded_items import RecordedItems
+
+    manifest = session.manifest
+    facts = {"session": manifest.name, "rig": manifest.rig, "object": manifest.object_name}
+    return write_foxglove(path, RecordedItems(session), facts)
+
+
+def export_rerun(session: Session, path: Path) -> int:
+    """What viewers show as a recording of Rerun; gives its items. Raises SessionError, or ConfigurationError without
+    rerun-sdk.
+    """
+    require_package("rerun", "view")
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.rerun_file import write_rerun
+
+    return write_rerun(path, RecordedItems(session), session.manifest.name)
 
 
 def _tables(session: Session) -> SampleTables:
@@ -131,8 +160,17 @@ EXPORTS: Mapping[str, Callable[[Session, Path], int]] = {
     "csv": export_csv,
     "hdf5": export_hdf5,
     "rosbag": export_rosbag,
+    "foxglove": export_foxglove,
+    "rerun": export_rerun,
     "archive": export_archive,
 }
 """Ways to write a whole session, by name."""
-UNITS = {"csv": "rows", "hdf5": "rows", "rosbag": "messages", "archive": "files"}
+UNITS = {
+    "csv": "rows",
+    "hdf5": "rows",
+    "rosbag": "messages",
+    "foxglove": "messages",
+    "rerun": "entries",
+    "archive": "files",
+}
 """What each of them counts."""

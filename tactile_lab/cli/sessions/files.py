@@ -45,6 +45,11 @@ def export(
     rosbag: Annotated[
         Path | None, typer.Option(help="Write a ROS 2 bag to this new folder (needs the package rosbags).")
     ] = None,
+    foxglove: Annotated[
+        Path | None,
+        typer.Option(help="Write frames, contacts, surface and pictures to this new MCAP file, for Foxglove."),
+    ] = None,
+    rerun: Annotated[Path | None, typer.Option(help="Write the same to this new RRD file, for Rerun.")] = None,
     archive: Annotated[Path | None, typer.Option(help="Write the whole session to this new ZIP file.")] = None,
     root: Root = Path("runs"),
     dimension: Annotated[
@@ -62,9 +67,17 @@ def export(
     from tactile_lab.workflow import exporting
 
     del no_input
-    if not any((contacts, csv, hdf5, rosbag, archive)):
-        raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --archive")
-    refuse_existing([place for place in (contacts, csv, hdf5, rosbag, archive) if place is not None])
+    places = {
+        "csv": csv,
+        "hdf5": hdf5,
+        "rosbag": rosbag,
+        "foxglove": foxglove,
+        "rerun": rerun,
+        "archive": archive,
+    }
+    if not any((contacts, *places.values())):
+        raise typer.BadParameter("give at least one of --contacts, --" + ", --".join(places))
+    refuse_existing([place for place in (contacts, *places.values()) if place is not None])
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
@@ -72,7 +85,7 @@ def export(
         answer(f"{count(log.grasps, 'grasp')} with {count(log.contacts, 'contact')}: {contacts}")
         if log.vertical:
             say(f"left out: {count(log.vertical, 'contact')} from above, which the plane does not have (--dimension 3)")
-    for kind, place in (("csv", csv), ("hdf5", hdf5), ("rosbag", rosbag), ("archive", archive)):
+    for kind, place in places.items():
         if place is not None:
             written = exporting.EXPORTS[kind](found, place)
             told |= {kind: str(place), f"{kind}_written": written}
