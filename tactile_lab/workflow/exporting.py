@@ -152,6 +152,19 @@ def export_rerun(session: Session, path: Path) -> int:
     return write_rerun(path, RecordedItems(session), session.manifest.name)
 
 
+def show_rerun(session: Session, address: str) -> int:
+    """Send what viewers show to Rerun's viewer at an address, or to a new one; gives its items.
+
+    Raises:
+        ConfigurationError: rerun-sdk is not installed, or the viewer cannot be reached.
+    """
+    require_package("rerun", "view")
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.rerun_file import show_in_rerun
+
+    return show_in_rerun(RecordedItems(session), session.manifest.name, address)
+
+
 def _tables(session: Session) -> SampleTables:
     return read_tables(session.traffic(), build_interpreter(rig_of_session(session)))
 

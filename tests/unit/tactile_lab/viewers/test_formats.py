@@ -62,8 +62,9 @@ def decoded(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
 
 def test_every_kind_of_item_is_decoded_by_foxglove_s_own_package(decoded):
     assert set(decoded) == {
-        "/camera/calibration", "/camera/image", "/candidates", "/contacts/forces", "/contacts/points", "/contacts/scene",
-        "/ft/FF/wrench", "/joint_states", "/loads", "/log", "/object/odometry", "/object/points", "/object/pose",
+        "/camera/calibration", "/camera/image", "/candidates", "/contacts/forces", "/contacts/points",
+        "/contacts/scene", "/ft/FF/wrench", "/joint_states", "/loads", "/log", "/object/odometry", "/object/points",
+        "/object/pose",
         "/object/surface", "/robot/scene", "/robot_description", "/tf", "/tf_static", "/truth/object",
     }  # fmt: skip
 
