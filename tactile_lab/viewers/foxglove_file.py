@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from mcap.writer import Writer
 
@@ -43,7 +44,8 @@ def foxglove_messages(items: RecordedItems) -> Iterator[Encoded]:
 
 class _McapFile:
     def __init__(self, writer: Writer, robot: Robot, facts: Mapping[str, str]) -> None:
-        self._writer, self._robot, self._facts = writer, robot, dict(facts)
+        self._writer: Any = writer
+        self._robot, self._facts = robot, dict(facts)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
 

@@ -71,7 +71,8 @@ class FoxgloveMessages:
             yield Encoded(_wrench_topic(item.finger), item.stamp_ns, data)
             return
         for name, message, key in _MAKERS[type(item)](item):
-            yield Encoded(_topic(name, type(message)), item.stamp_ns, message.encode(), key)
+            kind: Any = type(message)
+            yield Encoded(_topic(name, kind), item.stamp_ns, message.encode(), key)
 
 
 DESCRIPTION = Topic("/robot_description", "cdr", Schema("std_msgs/msg/String", "ros2msg", cdr.STRING.encode()))
@@ -327,7 +328,9 @@ def _cloud(stamp_ns: int, frame: str, columns: Mapping[str, Array], colours: Any
     for name, column in columns.items():
         table[name] = column
     if colours is not None:
-        table["red"], table["green"], table["blue"], table["alpha"] = *colours.T, 255
+        for name, channel in zip(("red", "green", "blue"), colours.T, strict=True):
+            table[name] = channel
+        table["alpha"] = 255
     return fm.PointCloud(
         timestamp=_time(stamp_ns),
         frame_id=frame,

@@ -22,6 +22,9 @@ _TABLE_m = (0.6, 0.6, 0.02)
 """Shown where the rig does not describe its table."""
 
 
+_ANYWHERE = ((-2.0, 2.0),) * 3 + ((-6.2832, 6.2832),) * 3
+
+
 def robot_of_rig(rig: Rig) -> Robot:
     """Hand, positioner and table of a rig.
 
@@ -32,7 +35,8 @@ def robot_of_rig(rig: Rig) -> Robot:
     tips = {finger: _tip(kind, finger, calibration) for finger, calibration in fitted_tips(rig).items()}
     size_m, centre_m = _table(rig)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
-    return make_robot(hand_form(rig), world_T_mount, tips, rig.description.base.ranges, size_m, centre_m)
+    ranges = getattr(rig.description.base, "ranges", _ANYWHERE)  # of a positioner of one's own there may be none
+    return make_robot(hand_form(rig), world_T_mount, tips, ranges, size_m, centre_m)
 
 
 def _table(rig: Rig) -> tuple[tuple[float, float, float], tuple[float, float]]:

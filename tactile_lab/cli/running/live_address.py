@@ -73,6 +73,4 @@ def serve_live(live: LiveAddress, title: str) -> Iterator[LiveFeed]:
         say(f"live: {feed.url}   (Foxglove, Lichtblick: open connection, Foxglove WebSocket)")
         yield feed
     if feed.dropped:
-        warn(
-            f"the viewers' server was slower than the session: {feed.dropped} messages were not sent, but all are recorded"
-        )
+        warn(f"the viewers' server was too slow: {feed.dropped} messages were not sent, but all are recorded")

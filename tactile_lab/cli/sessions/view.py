@@ -60,4 +60,4 @@ def _send_to_rerun(found: Session, address: str) -> None:
     from tactile_lab.cli.console import count, say
     from tactile_lab.workflow.exporting import show_rerun
 
-    say(f"sent to Rerun: {count(show_rerun(found, address), 'entry', 'entries')}")
+    say(f"sent to Rerun: {count(show_rerun(found, address), 'item')}")

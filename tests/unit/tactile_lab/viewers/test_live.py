@@ -216,7 +216,7 @@ def run(work: Any) -> Any:
 def test_a_port_that_is_taken_is_said_in_one_sentence(feed):
     port = int(feed.url.split(":")[2].partition("/")[0])
     with (
-        pytest.raises(DeviceError, match="cannot listen on 127.0.0.1:") as refused,
+        pytest.raises(DeviceError, match=r"cannot listen on 127\.0\.0\.1:") as refused,
         LiveFeed("sim", "127.0.0.1", port, TOKEN, "second"),
     ):
         pass
