@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from drivers.core.errors import SessionError
+from drivers.core.installed.extras import require_package
 from drivers.shadow.model.kinematics import JOINTS
 from sessions.exchange.sample_tables import SampleTables
 from tactile_lab.viewers.items import Frames, Item
-from tactile_lab.viewers.packages import require_package
 from tactile_lab.viewers.robot import POSITIONER_JOINTS, Robot
 from tactile_lab.viewers.ros_messages import JOINT_STATE, TEXT, WRENCH, RosMessages
 
@@ -35,7 +35,7 @@ def write_ros_bag(folder: Path, robot: Robot, items: Iterable[Item], tables: Sam
         ConfigurationError: rosbags is not installed.
         SessionError: the folder exists or cannot be written.
     """
-    require_package("rosbags", "ros")
+    require_package("rosbags")
     from rosbags.rosbag2 import WriterError
     from rosbags.typesys import Stores, get_typestore
 

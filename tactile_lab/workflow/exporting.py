@@ -12,6 +12,7 @@ import numpy as np
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Contact
 from drivers.core.errors import SessionError
+from drivers.core.installed.extras import require_package
 from sessions.exchange.archives import export_archive
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from sessions.exchange.sample_tables import SampleTables, read_tables
@@ -20,7 +21,6 @@ from sessions.recording.session import Session
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
-from tactile_lab.viewers.packages import require_package
 from tactile_lab.workflow.replaying import recorded_slam, true_poses
 
 
@@ -132,7 +132,7 @@ def export_foxglove(session: Session, path: Path) -> int:
     """What viewers show as an MCAP file of Foxglove's types; gives its messages. Raises SessionError, or
     ConfigurationError without foxglove-sdk.
     """
-    require_package("foxglove", "export")
+    require_package("foxglove")
     from tactile_lab.viewers.foxglove_file import write_foxglove
     from tactile_lab.viewers.recorded_items import RecordedItems
 
@@ -145,7 +145,7 @@ def export_rerun(session: Session, path: Path) -> int:
     """What viewers show as a recording of Rerun; gives its items. Raises SessionError, or ConfigurationError without
     rerun-sdk.
     """
-    require_package("rerun", "view")
+    require_package("rerun")
     from tactile_lab.viewers.recorded_items import RecordedItems
     from tactile_lab.viewers.rerun_file import write_rerun
 
@@ -158,7 +158,7 @@ def show_rerun(session: Session, address: str) -> int:
     Raises:
         ConfigurationError: rerun-sdk is not installed, or the viewer cannot be reached.
     """
-    require_package("rerun", "view")
+    require_package("rerun")
     from tactile_lab.viewers.recorded_items import RecordedItems
     from tactile_lab.viewers.rerun_file import show_in_rerun
 

@@ -62,12 +62,12 @@ class LiveAddress:
 @contextmanager
 def serve_live(live: LiveAddress, title: str) -> Iterator[LiveFeed]:
     """The server, while the session runs. Raises ConfigurationError, DeviceError."""
+    from drivers.core.installed.extras import require_package
     from tactile_lab.cli.console import say, warn
     from tactile_lab.viewers.live.feed import LiveFeed
-    from tactile_lab.viewers.packages import require_package
 
     for package in ("foxglove", "websockets"):
-        require_package(package, "view")
+        require_package(package)
     _, port, token, _ = PageAddress(HERE, live.port, live.token).check()
     with LiveFeed(live.rig, HERE, port, token, title, live.origin) as feed:
         say(f"live: {feed.url}   (Foxglove, Lichtblick: open connection, Foxglove WebSocket)")

@@ -15,9 +15,9 @@ from mcap_protobuf.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import SessionError
 from sessions.exchange.sample_tables import SampleTables
-from tactile_lab.viewers import cdr, packages
+from tactile_lab.viewers import cdr
 from tactile_lab.viewers.foxglove_file import write_foxglove
 from tactile_lab.viewers.items import Item, Surface
 from tactile_lab.viewers.rerun_file import write_rerun
@@ -210,9 +210,3 @@ def test_a_session_without_a_shape_gives_everything_else(tmp_path):
 
     assert write_foxglove(tmp_path / "a.mcap", Shapeless(), {}) > 20
     assert write_ros_bag(tmp_path / "bag", Shapeless().robot, Shapeless(), SampleTables()) > 10
-
-
-def test_a_package_that_is_not_there_is_named_with_the_command_that_installs_it():
-    with pytest.raises(ConfigurationError, match=r"no_such_viewer.*\[view\].*pip --python .*'tactile-lab\[view\]'"):
-        packages.require_package("no_such_viewer", "view")
-    packages.require_package("foxglove", "export")
