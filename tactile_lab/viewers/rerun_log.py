@@ -33,6 +33,8 @@ from tactile_lab.viewers.robot import CAMERA, OBJECT, TABLE, WORLD, Placement, R
 
 TIMELINE = "session"
 _FORCE_SCALE_m_N, _CANDIDATE_m, _SIGMAS = 0.025, 0.03, 2.0
+_EYE_m, _LOOKED_AT_m = (0.30, -0.33, 0.24), (-0.02, 0.0, 0.09)
+"""Where the scene is seen from at first, world frame."""
 _HAND, _TIP, _PLATE = (120, 128, 138), (92, 112, 143), (219, 224, 230)
 _CONTACT, _CANDIDATE, _CHOSEN = (230, 76, 26), (115, 115, 128), (214, 90, 160)
 _LEVELS = {2: "INFO", 3: "WARN", 4: "ERROR"}
@@ -114,7 +116,9 @@ class RerunLog:
             self._stream.log(f"{WORLD}/contacts/grasp_{number}", rr.Clear(recursive=True))
         here, points_m = f"{WORLD}/contacts/grasp_{item.grasp}", item.points_world_m
         names = [one.finger for one in item.touches]
-        self._stream.log(f"{here}/points", rr.Points3D(points_m, radii=0.0015, colors=[_CONTACT], labels=names))
+        self._stream.log(
+            f"{here}/points", rr.Points3D(points_m, radii=0.0015, colors=[_CONTACT], labels=names, show_labels=False)
+        )
         turns, sizes_m = _ellipsoids([one.covariance_m2 for one in item.touches])
         self._stream.log(
             f"{here}/uncertainty",
@@ -156,6 +160,7 @@ class RerunLog:
             vectors=[_CANDIDATE_m * pose.rotation().matrix()[:, 0] for pose in poses],
             colors=colours,
             labels=labels,
+            show_labels=False,
         )
         self._stream.log(f"{WORLD}/candidates", arrows)
         self._stream.log("log", rr.TextLog(item.text, level="INFO"))
@@ -175,7 +180,8 @@ class RerunLog:
 
 def blueprint() -> rrb.Blueprint:
     """The views that are open at first: the scene, loads, the camera, the log."""
-    scene = rrb.Spatial3DView(origin=WORLD, name="hand and object")
+    eye = rrb.EyeControls3D(position=_EYE_m, look_target=_LOOKED_AT_m, eye_up=(0.0, 0.0, 1.0))
+    scene = rrb.Spatial3DView(origin=WORLD, name="hand and object", eye_controls=eye)
     side = rrb.Vertical(
         rrb.TimeSeriesView(origin="load_N", name="load on the fingertips [N]"),
         rrb.Spatial2DView(origin=f"{WORLD}/{CAMERA}/image", name="camera"),

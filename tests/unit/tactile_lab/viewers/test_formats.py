@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -24,6 +25,7 @@ from tactile_lab.viewers.rerun_file import write_rerun
 from tactile_lab.viewers.robot import CAMERA, OBJECT, WORLD, Robot
 from tactile_lab.viewers.ros_bag import write_ros_bag
 from tests.support import told_session
+from tests.support.repository import REPOSITORY
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 RERUN = Path(sys.executable).with_name("rerun")
@@ -67,6 +69,16 @@ def test_every_kind_of_item_is_decoded_by_foxglove_s_own_package(decoded):
         "/object/pose",
         "/object/surface", "/robot/scene", "/robot_description", "/tf", "/tf_static", "/truth/object",
     }  # fmt: skip
+
+
+def test_the_layout_shows_topics_that_there_are(decoded):
+    layout = json.loads((REPOSITORY / "docs" / "examples" / "foxglove-layout.json").read_text())
+    panels = layout["configById"]
+    shown = set(panels["3D!hand"]["topics"]) | set(panels["Image!camera"]["imageMode"].values())
+    shown |= {panels["RosOut!log"]["topicToRender"]}
+    shown |= {one["value"].partition(".")[0] for one in panels["Plot!forces"]["paths"] if "/FF/" in one["value"]}
+    assert shown <= set(decoded)
+    assert json.dumps(layout["layout"]).count("!") == len(panels)  # every panel has its place
 
 
 def test_frames_form_one_tree_below_the_world(decoded):
