@@ -105,7 +105,7 @@ class ProcessFeed(ABC):
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Queue a message, without waiting."""
-        if not self.is_shown(topic):
+        if not self.is_shown(topic, data):
             return
         content = {"topic": topic, "stamp_ns": stamp_ns, "dropped": self.dropped}
         line = json.dumps({**content, "data": base64.b64encode(data).decode()})
@@ -154,8 +154,8 @@ class ProcessFeed(ABC):
             return
 
     @abstractmethod
-    def is_shown(self, topic: str) -> bool:
-        """Whether the process needs messages of this topic."""
+    def is_shown(self, topic: str, data: bytes) -> bool:
+        """Whether the process needs a message of a topic."""
 
     @abstractmethod
     def on_press(self, content: Mapping[str, Any]) -> None:

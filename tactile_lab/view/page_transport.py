@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
+from drivers.camera.packet import picture_of
 from tactile_lab.process_feed import ProcessFeed
-from tactile_lab.view.scene import SHOWN_TOPICS
+from tactile_lab.view.scene import CAMERA_PACKETS, SHOWN_TOPICS
 
 
 class PageTransport(ProcessFeed):
@@ -34,5 +35,6 @@ class PageTransport(ProcessFeed):
         settings = {"panel": panel, "title": title, **door}
         super().__init__("tactile_lab.view.process", settings, name="page", hint=hint)
 
-    def is_shown(self, topic: str) -> bool:
-        return topic in SHOWN_TOPICS
+    def is_shown(self, topic: str, data: bytes) -> bool:
+        """Most of a camera's packets hold corners only."""
+        return topic in SHOWN_TOPICS and (topic != CAMERA_PACKETS or bool(picture_of(data)))

@@ -50,6 +50,10 @@ def export(
         typer.Option(help="Write frames, contacts, surface and pictures to this new MCAP file, for Foxglove."),
     ] = None,
     rerun: Annotated[Path | None, typer.Option(help="Write the same to this new RRD file, for Rerun.")] = None,
+    tum: Annotated[
+        Path | None,
+        typer.Option(help="Write the estimated and the true trajectory to this new folder, in TUM's text format."),
+    ] = None,
     archive: Annotated[Path | None, typer.Option(help="Write the whole session to this new ZIP file.")] = None,
     root: Root = Path("runs"),
     dimension: Annotated[
@@ -67,17 +71,19 @@ def export(
     from tactile_lab.workflow import exporting
 
     del no_input
-    places = {
+    kinds = {
         "csv": csv,
         "hdf5": hdf5,
         "rosbag": rosbag,
         "foxglove": foxglove,
         "rerun": rerun,
+        "tum": tum,
         "archive": archive,
     }
-    if not any((contacts, *places.values())):
-        raise typer.BadParameter("give at least one of --contacts, --" + ", --".join(places))
-    refuse_existing([place for place in (contacts, *places.values()) if place is not None])
+    places = [place for place in (contacts, *kinds.values()) if place is not None]
+    if not places:
+        raise typer.BadParameter("give at least one of --contacts, --" + ", --".join(kinds))
+    refuse_existing(places)
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
@@ -85,7 +91,7 @@ def export(
         answer(f"{count(log.grasps, 'grasp')} with {count(log.contacts, 'contact')}: {contacts}")
         if log.vertical:
             say(f"left out: {count(log.vertical, 'contact')} from above, which the plane does not have (--dimension 3)")
-    for kind, place in places.items():
+    for kind, place in kinds.items():
         if place is not None:
             written = exporting.EXPORTS[kind](found, place)
             told |= {kind: str(place), f"{kind}_written": written}

@@ -25,7 +25,7 @@ class LiveFeed(ProcessFeed):
         hint = "Choose another --live-port, or run without --live"
         super().__init__("tactile_lab.viewers.live.process", settings, name="live", hint=hint)
 
-    def is_shown(self, topic: str) -> bool:
+    def is_shown(self, topic: str, data: bytes) -> bool:
         return topic not in TRUTH_TOPICS and is_shown(topic)
 
     def on_press(self, content: Mapping[str, Any]) -> None:
