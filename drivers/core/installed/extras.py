@@ -21,6 +21,8 @@ EXTRAS = {
     "foxglove": "export",
     "rerun": "rerun",
     "h5py": "export",
+    "distributed": "cluster",
+    "pyarrow": "cluster",
     "rosbags": "ros",
     "pxr": "usd",
 }
