@@ -10,10 +10,9 @@ import pytest
 
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.catalogue import EXPERIMENTS, experiment
-from tactile_lab.experiments.cells import Row
+from tactile_lab.experiments.cells import Row, execute
 from tactile_lab.experiments.experiment import REPORTED_SEEDS, Experiment
 from tactile_lab.experiments.reporting import write_report
-from tactile_lab.experiments.runner import execute
 from tactile_lab.experiments.studies.planar import METHODS
 
 TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
