@@ -1,12 +1,14 @@
 """Figures of one run: quality of the shape, the tracking and the stated uncertainty, and computing time.
 
 Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error; rotations
-    of a solid about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
-    surface whose true error is within two stated standard deviations.
+    of an object about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
+    surface whose true error is within two stated standard deviations, and shares of surface and poses inside their
+    stated 50, 68 and 95 % regions (:mod:`tactile_lab.evaluation.consistency`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +16,12 @@ import trimesh
 
 from drivers.core.contacts import Array
 from drivers.core.poses import spatial, transform_points
+from tactile_lab.evaluation.consistency.pose_covariance import covariances_in_world
+from tactile_lab.evaluation.consistency.poses import birth_frame, common_frame, pose_consistency
+from tactile_lab.evaluation.consistency.surfaces import SurfaceConsistency, mesh_consistency, outline_consistency
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.trajectory import Poses
-from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, stands, symmetry_turns
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, outline_symmetry, stands, symmetry_turns
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
@@ -36,7 +41,8 @@ def contour_figures(contour: Contour | None, outline_m: Array) -> dict[str, Any]
     fit = align_contours(contour.points_m, outline_m)
     moved = transform_points(spatial(fit), np.pad(contour.points_m, ((0, 0), (0, 1))))[:, :2]
     covered = _within(distances_to_polygon(moved, outline_m), contour.sigma_m)
-    return _shape_figures(contour_errors(contour.points_m, outline_m, fit), covered, contour.is_closed)
+    judged = outline_consistency(contour.points_m, contour.sigma_m, outline_m, fit)
+    return _shape_figures(contour_errors(contour.points_m, outline_m, fit), covered, contour.is_closed, judged)
 
 
 def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: bool = True) -> dict[str, Any]:
@@ -47,7 +53,8 @@ def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: b
         return dict(NO_SHAPE)
     fit = align_meshes(mesh, truth, upright=upright)
     covered = _within(distances_to_mesh(transform_points(fit, mesh.vertices), truth), mesh.sigma_m)
-    return _shape_figures(mesh_errors(mesh, truth, fit), covered, mesh.is_closed)
+    judged = mesh_consistency(mesh, mesh.sigma_m, truth, fit)
+    return _shape_figures(mesh_errors(mesh, truth, fit), covered, mesh.is_closed, judged)
 
 
 def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
@@ -58,6 +65,7 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
         shape = mesh_figures(result.mesh, data.mesh, upright=all(map(stands, data.world_T_body)))
     return {
         **shape,
+        **pose_figures(data, result),
         "registration_mm": registration_mm(data, result.world_T_object, result.dimension),
         "status": result.status,
         "contacts": sum(len(grasp.contacts) for grasp in data.grasps),
@@ -66,23 +74,53 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
     }
 
 
+def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
+    """Stated pose covariances against the truth, in the first grasp's object frame and in the best common one."""
+    truth, poses = data.world_T_body, _modulo_symmetry(data, result.world_T_object)
+    stated = covariances_in_world(result)
+    in_common = covariances_in_world(replace(result, covariances=result.common_covariances or result.covariances))
+    figures: dict[str, Any] = {}
+    for name, given, frame in (
+        ("", stated, birth_frame(poses, truth)),
+        ("common_", in_common, common_frame(poses, truth)),
+    ):
+        judged = pose_consistency(poses, given, truth, frame)
+        if judged is not None:
+            figures |= {
+                f"{name}poses_inside": list(judged.inside),
+                f"{name}nees": [round(value, 4) for value in judged.nees],
+                f"{name}poses_log_score": judged.log_score,
+            }
+    return figures
+
+
 def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
     """Registration error of a trajectory; rotations that no contact can distinguish are ignored."""
-    turns = symmetry_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
-    poses = modulo_symmetry(estimate, data.world_T_body, turns)
+    poses = _modulo_symmetry(data, estimate)
     contacts = [grasp.points_world_m for grasp in data.grasps]
     return registration_rms_mm(contacts, poses, data.world_T_body, dimension)
+
+
+def _modulo_symmetry(data: SimulatedGrasps, estimate: Poses) -> Poses:
+    if isinstance(data, SpatialGrasps):
+        return modulo_symmetry(estimate, data.world_T_body, symmetry_turns(data.mesh))
+    found = outline_symmetry(data.outline_m) if isinstance(data, PlanarGrasps) else None
+    return estimate if found is None else modulo_symmetry(estimate, data.world_T_body, found.order, found.centre_m)
 
 
 def _within(errors_m: Array, sigma_m: Array) -> float:
     return float(np.mean(errors_m <= 2 * sigma_m))
 
 
-def _shape_figures(errors: ShapeErrors, covered: float, closed: bool) -> dict[str, Any]:
+def _shape_figures(errors: ShapeErrors, covered: float, closed: bool, judged: SurfaceConsistency) -> dict[str, Any]:
     return {
         "hausdorff_mm": 1e3 * errors.hausdorff_m,
         "mean_mm": 1e3 * errors.mean_distance_m,
         "iou": errors.iou,
         "within_2_sigma": covered,
         "closed": closed,
+        "fscore_1mm": errors.fscore_1mm,
+        "surface_inside": list(judged.inside),
+        "surface_log_score": judged.log_score,
+        "surface_signed_mm": judged.signed_mm,
     }

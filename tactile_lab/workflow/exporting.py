@@ -1,4 +1,4 @@
-"""A session as a contact log, for other programs and for :mod:`tactile_lab.workflow.reconstructing`."""
+"""A session as files of other programs; as a contact log also for :mod:`tactile_lab.workflow.reconstructing`."""
 
 from __future__ import annotations
 
@@ -12,11 +12,16 @@ import numpy as np
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Contact
 from drivers.core.errors import SessionError
+from drivers.core.installed.extras import require_package
 from sessions.exchange.archives import export_archive
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from sessions.exchange.sample_tables import SampleTables, read_tables
 from sessions.perception.replay import Replay, kept_grasps
 from sessions.recording.session import Session
+from tactile_lab.evaluation.files.trajectory_file import read_trajectory
+from tactile_lab.evaluation.files.tum_file import tum_text
+from tactile_lab.evaluation.trajectory import aligned_poses
+from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -117,22 +122,101 @@ def export_hdf5(session: Session, path: Path) -> int:
 
 
 def export_rosbag(session: Session, folder: Path) -> int:
-    """All samples as a ROS 2 bag; gives their number. Raises SessionError, or ConfigurationError without rosbags."""
-    from sessions.exchange.ros_bag import write_ros_bag
+    """Frames, markers and all samples as a ROS 2 bag; gives its messages. Raises SessionError, or ConfigurationError
+    without rosbags.
+    """
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.ros_bag import write_ros_bag
 
-    return write_ros_bag(_tables(session), folder)
+    items = RecordedItems(session)
+    return write_ros_bag(folder, items.robot, items, _tables(session))
+
+
+def export_foxglove(session: Session, path: Path) -> int:
+    """What viewers show as an MCAP file of Foxglove's types; gives its messages. Raises SessionError, or
+    ConfigurationError without foxglove-sdk.
+    """
+    require_package("foxglove")
+    from tactile_lab.viewers.foxglove_file import write_foxglove
+    from tactile_lab.viewers.recorded_items import RecordedItems
+
+    manifest = session.manifest
+    facts = {"session": manifest.name, "rig": manifest.rig, "object": manifest.object_name}
+    return write_foxglove(path, RecordedItems(session), facts)
+
+
+def export_rerun(session: Session, path: Path) -> int:
+    """What viewers show as a recording of Rerun; gives its items. Raises SessionError, or ConfigurationError without
+    rerun-sdk.
+    """
+    require_package("rerun")
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.rerun_file import write_rerun
+
+    return write_rerun(path, RecordedItems(session), session.manifest.name)
+
+
+def show_rerun(session: Session, address: str) -> int:
+    """Send what viewers show to Rerun's viewer at an address, or to a new one; gives its items.
+
+    Raises:
+        ConfigurationError: rerun-sdk is not installed, or the viewer cannot be reached.
+    """
+    require_package("rerun")
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.rerun_file import show_in_rerun
+
+    return show_in_rerun(RecordedItems(session), session.manifest.name, address)
 
 
 def _tables(session: Session) -> SampleTables:
     return read_tables(session.traffic(), build_interpreter(rig_of_session(session)))
 
 
+def export_tum(session: Session, folder: Path) -> int:
+    """Write the estimated trajectory, and the true one where it is known, as ``estimate.tum`` and ``truth.tum``.
+
+    The estimate is that of the truth's object frame, tied to the estimated one at the first common grasp; without truth
+    that of the estimated object frame. Gives the number of poses.
+
+    Raises:
+        SessionError: the session has no results.
+        WriteError: the folder cannot be written.
+    """
+    trajectory, truth_file = read_trajectory(session.results / "trajectory.csv"), session.results / TRUTH_TRAJECTORY
+    stamps_s, estimate = trajectory.stamps_s, trajectory.world_T_object
+    texts = {"estimate.tum": tum_text(stamps_s, estimate)}
+    truth = read_trajectory(truth_file).world_T_object if truth_file.is_file() else (None,) * len(stamps_s)
+    if len(truth) != len(stamps_s):
+        hint = "Evaluate the session again"
+        raise SessionError(f"has {len(truth)} poses instead of {len(stamps_s)}", where=str(truth_file), hint=hint)
+    if any(pose is not None for pose in truth):
+        texts = {
+            "estimate.tum": tum_text(stamps_s, aligned_poses(estimate, truth)),
+            "truth.tum": tum_text(stamps_s, truth),
+        }
+    for name, text in texts.items():
+        write_whole(folder / name, text)
+    return sum(text.count("\n") - 1 for text in texts.values())
+
+
 EXPORTS: Mapping[str, Callable[[Session, Path], int]] = {
     "csv": export_csv,
     "hdf5": export_hdf5,
     "rosbag": export_rosbag,
+    "foxglove": export_foxglove,
+    "rerun": export_rerun,
+    "tum": export_tum,
     "archive": export_archive,
 }
 """Ways to write a whole session, by name."""
-UNITS = {"csv": "rows", "hdf5": "rows", "rosbag": "messages", "archive": "files"}
+UNITS = {
+    "csv": "rows",
+    "hdf5": "rows",
+    "rosbag": "messages",
+    "foxglove": "messages",
+    "rerun": "entries",
+    "tum": "poses",
+    "archive": "files",
+}
 """What each of them counts."""

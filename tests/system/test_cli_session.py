@@ -12,7 +12,7 @@ EVALUATION_KEYS = {
     "schema_version", "method", "seed", "object", "grasps", "contacts", "shape", "pose", "loops", "time", "status",
     "aligned", "shape_best_fit",
 }  # fmt: skip
-SHAPE_KEYS = {"hausdorff_mm", "mean_distance_mm", "chamfer_mm", "fscore_5mm", "iou"}
+SHAPE_KEYS = {"hausdorff_mm", "mean_distance_mm", "chamfer_mm", "fscore_1mm", "fscore_2mm", "iou"}
 POSE_KEYS = {"rmse_mm", "rmse_deg", "final_mm", "final_deg", "per_grasp"}
 REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", "slam.json")
 
@@ -50,6 +50,13 @@ def test_the_session_folder_is_complete(recorded):
     lines = (recorded / "results" / "trajectory.csv").read_text().splitlines()
     assert len(lines) == 1 + 2
     assert not [name for name in files if name.endswith(".part")]
+
+
+def test_the_report_shows_the_cameras_picture_with_the_estimate(recorded):
+    page = (recorded / "results" / "report.html").read_text()
+    assert "picture of grasp 2" in page
+    assert 'href="data:image/jpeg;base64,' in page
+    assert page.count("estimate-seen") >= 2  # the outline, and its legend
 
 
 def test_the_report_fetches_nothing(recorded):

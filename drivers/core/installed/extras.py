@@ -17,7 +17,12 @@ EXTRAS = {
     "coacd": "sim",
     "fpdf": "hardware",
     "viser": "view",
+    "websockets": "view",
+    "foxglove": "export",
+    "rerun": "rerun",
     "h5py": "export",
+    "distributed": "cluster",
+    "pyarrow": "cluster",
     "rosbags": "ros",
     "pxr": "usd",
 }

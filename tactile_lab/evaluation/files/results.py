@@ -13,7 +13,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import SessionError
 from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.tables import RERUN, ContactRows, read_contacts
-from tactile_lab.evaluation.trajectory import Trajectory, read_trajectory
+from tactile_lab.evaluation.files.trajectory_file import Trajectory, read_trajectory
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,20 @@ class Results:
         """Standard deviation over the contour or surface as percentiles; None without a shape."""
         quantiles = self.slam.get("sigma_quantiles_m")
         return None if quantiles is None else np.array(quantiles, dtype=float)
+
+    @property
+    def status(self) -> str:
+        """How much may be believed, see :mod:`tactile_lab.slam.doubt.status`; what older files call "ok" is "complete",
+        without a known share.
+        """
+        status = str(self.slam["status"])
+        return "complete" if status == "ok" else status
+
+    @property
+    def known_share(self) -> float | None:
+        """Share of the outline or surface that was touched; None if unknown."""
+        share = self.slam.get("known_share")
+        return None if share is None else float(share)
 
     @property
     def dimension(self) -> int:

@@ -22,7 +22,7 @@ from tactile_lab.colours import UNKNOWN, hex_colour, viridis
 from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import evaluate
 from tactile_lab.evaluation.files.result_files import write_results
-from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
+from tactile_lab.evaluation.files.trajectory_file import Trajectory, trajectory_text
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.report.course import Course, Stop, read_course
 from tactile_lab.report.listings import decisions_card, stops_card
@@ -117,6 +117,15 @@ def test_page_fetches_nothing(text: str) -> None:
     policy = [meta["content"] for meta in page.of("meta") if meta.get("http-equiv")]
     assert policy[0] is not None
     assert "default-src 'none'" in policy[0]
+
+
+def test_what_the_estimate_says_of_itself_is_drawn(text: str) -> None:
+    words = Page(text).texts
+    assert "Are the uncertainties true?" in words
+    assert words.count("two stated standard deviations") == 2
+    assert {"Length", "Width"} <= set(words)
+    assert text.count('class="bound"') == 4  # both bands over the grasps, and their legends
+    assert "Poses inside" in words
 
 
 def test_texts_of_people_are_escaped(text: str) -> None:

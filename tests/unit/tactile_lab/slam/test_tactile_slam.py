@@ -56,7 +56,7 @@ def test_few_contacts_wait_for_more_while_the_object_stays(carried_m: float, ver
 def test_the_default_method_tracks_at_full_motion_noise(shape: str) -> None:
     data = simulate(shape, 1, count=10)
     result = run(data)
-    assert result.status == "ok"
+    assert result.status == "complete"
     assert registration_mm(data, result) < 4.0
     assert result.contour is not None
     body_T_object = data.world_T_body[0].between(result.world_T_object[0])
@@ -69,6 +69,19 @@ def test_the_calibrated_filter_tracks_at_the_slip_of_the_rig() -> None:
     result = run(data, method="particle", particles=10_000)
     assert registration_mm(data, result) < 5.0
     assert all(1 < step.effective_count <= 10_000 for step in result.steps)
+
+
+def test_the_thesis_s_filter_follows_an_object_that_hardly_slips() -> None:
+    data = simulate("rectangle", 3, count=8, motion_scale=0.1)
+    result = run(data, method="thesis-pf", motion={"translation_m": 0.001, "rotation_rad": 0.035}, particles=5_000)
+    assert result.status == "ok"
+    assert registration_mm(data, result) < 5.0
+
+
+@pytest.mark.parametrize("matching", ["map", "previous"])
+def test_the_thesis_s_likelihood_may_know_the_previous_grasp_alone(matching: str) -> None:
+    result = run(simulate("ellipse", 3, count=4), method="thesis-pf", matching=matching, particles=1_000)
+    assert len(result.world_T_object) == 4
 
 
 def test_the_thesis_s_filter_runs_and_says_which_grasps_it_could_not_place() -> None:
@@ -156,7 +169,7 @@ def test_a_grasp_that_finds_its_place_at_the_end_is_not_lost() -> None:
         slam.step(grasp)
     assert slam.step(carried.grasps[6]).verdict == "untracked"
     assert slam.is_lost
-    assert slam.finish().status == "ok"
+    assert slam.finish().status != "lost"
 
 
 def test_a_session_without_any_contact_is_lost_but_finishes() -> None:
