@@ -19,7 +19,7 @@ EXTRAS = {
     "viser": "view",
     "h5py": "export",
     "distributed": "cluster",
-    "pyarrow": "cluster",
+    "pyarrow": "export",
     "rosbags": "ros",
     "pxr": "usd",
 }
