@@ -182,7 +182,7 @@ def _sensing(estimate: EstimateWithTruth) -> SensingFigures | None:
 
 
 def _failed(estimate: EstimateWithTruth) -> bool | None:
-    if str(estimate.results.slam["status"]) != "ok":
+    if estimate.results.status == "lost":
         return True
     error_mm = estimate.registration_rms_mm
     return None if error_mm is None else error_mm > FAILURE_LIMIT_MM

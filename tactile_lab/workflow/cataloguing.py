@@ -22,7 +22,7 @@ UNITS: Mapping[str, str] = {
     "session": "", "folder": "", "status": "", "started_utc": "ISO 8601", "duration_s": "s", "rig": "",
     "fingertips": "", "positioner": "", "object": "", "grasps": "", "method": "", "dimension": "", "policy": "",
     "seed": "",
-    "evaluated_method": "", "contacts": "", "failed": "", "registration_rms_mm": "mm", "hausdorff_mm": "mm",
+    "evaluated_method": "", "result": "", "contacts": "", "failed": "", "registration_rms_mm": "mm", "hausdorff_mm": "mm",
     "hausdorff_best_fit_mm": "mm", "iou": "1", "pose_rmse_mm": "mm", "pose_rmse_deg": "deg", "sigma_median_mm": "mm",
     "data_loss": "", "traffic_bytes": "byte", "version": "", "plugins": "", "notes": "", "problem": "",
 }  # fmt: skip
@@ -37,6 +37,7 @@ _TYPES: Mapping[str, str] = {
 
 _FIGURES = {
     "evaluated_method": ("method",),
+    "result": ("status",),
     "contacts": ("contacts",),
     "failed": ("failed",),
     "registration_rms_mm": ("registration_rms_mm",),

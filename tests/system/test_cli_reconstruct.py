@@ -66,7 +66,7 @@ def test_a_planar_log_is_reconstructed_and_judged(inside, planar_log, tmp_path):
         "joint",
         4,
         "rectangle",
-        "ok",
+        "complete",
     )
     assert document["shape_best_fit"]["hausdorff_mm"] < 10.0
     assert document["shape"]["mean_distance_mm"] >= document["shape_best_fit"]["mean_distance_mm"] - 0.5
