@@ -21,8 +21,8 @@ from tactile_lab.workflow.plugging import RECORD
 UNITS: Mapping[str, str] = {
     "session": "", "folder": "", "status": "", "started_utc": "ISO 8601", "duration_s": "s", "rig": "",
     "fingertips": "", "positioner": "", "object": "", "grasps": "", "method": "", "dimension": "", "policy": "",
-    "seed": "",
-    "evaluated_method": "", "result": "", "contacts": "", "failed": "", "registration_rms_mm": "mm", "hausdorff_mm": "mm",
+    "seed": "", "evaluated_method": "", "result": "", "contacts": "", "failed": "", "registration_rms_mm": "mm",
+    "hausdorff_mm": "mm",
     "hausdorff_best_fit_mm": "mm", "iou": "1", "pose_rmse_mm": "mm", "pose_rmse_deg": "deg", "sigma_median_mm": "mm",
     "data_loss": "", "traffic_bytes": "byte", "version": "", "plugins": "", "notes": "", "problem": "",
 }  # fmt: skip
