@@ -15,6 +15,7 @@ from typing import Any
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
+from tactile_lab.autonomy.freed_memory import return_freed_memory
 from drivers.core.poses import planar
 from sessions.conductor.estimator import Estimate, PlannedGrasp, Reorientation
 from sessions.motion.bounding_box import BoundingBox
@@ -98,6 +99,7 @@ class SlamService:
         self._estimates.append(Estimate(step, surface_message(shape), None if shape is None else shape.explored))
         self._count += 1
         self._estimates = self._estimates[known - self._count :]
+        return_freed_memory()
         return tuple(self._estimates)
 
     def undo(self, hand_motion_world: Pose3) -> None:
