@@ -15,11 +15,11 @@ from typing import Any
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
-from tactile_lab.autonomy.freed_memory import return_freed_memory
 from drivers.core.poses import planar
 from sessions.conductor.estimator import Estimate, PlannedGrasp, Reorientation
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
+from tactile_lab.autonomy.freed_memory import return_freed_memory
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.surface_message import surface_message
 from tactile_lab.autonomy.unknown_part import describe_unknown
