@@ -84,3 +84,20 @@ NoInput = Annotated[
         "simulated operator leads guided sessions.",
     ),
 ]
+
+Scheduler = Annotated[
+    str,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Run on the workers of this Dask scheduler (tcp://host:8786, or tls:// with Dask's own configuration).",
+    ),
+]
+Merge = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FOLDER", help="Take over the finished runs of this folder, from another machine. Can be repeated."
+    ),
+]
+ParquetFile = Annotated[
+    Path | None, typer.Option("--parquet", metavar="FILE", help="Write all runs as a Parquet table, too.")
+]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
 
+from drivers.core.errors import TactileLabError
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 
 Value: TypeAlias = str | int | float
@@ -84,6 +85,16 @@ class Row:
 
 Work: TypeAlias = Callable[[Cell], Mapping[str, Any]]
 """Runs a cell and returns its figures; a function at module level, so that other processes can import it."""
+
+
+def execute(cell: Cell, work: Work) -> Row:
+    """Run one cell; any error becomes the result of this run, and the others continue."""
+    try:
+        return Row(cell, work(cell))
+    except TactileLabError as error:
+        return Row(cell, None, str(error))
+    except Exception as error:  # a defect appears in the table as a failed run with its name
+        return Row(cell, None, f"{type(error).__name__}: {error}")
 
 
 def grid(**values: Sequence[Value]) -> list[Setting]:

@@ -7,7 +7,19 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, METHOD_HELP, MOST_GRASPS, MOST_JOBS, Json, Method, NoInput, RigName
+from tactile_lab.cli.options import (
+    LARGEST_SEED,
+    METHOD_HELP,
+    MOST_GRASPS,
+    MOST_JOBS,
+    Json,
+    Merge,
+    Method,
+    NoInput,
+    ParquetFile,
+    RigName,
+    Scheduler,
+)
 
 
 def sweep(
@@ -23,6 +35,9 @@ def sweep(
         bool,
         typer.Option("--check-replay", help="Replay every session; a session whose replay differs counts as failed."),
     ] = False,
+    scheduler: Scheduler = "",
+    merge: Merge = None,
+    parquet: ParquetFile = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -34,9 +49,10 @@ def sweep(
 
     from drivers.core.atomic_files import write_whole
     from tactile_lab.cli.console import answer, emit_json, say, show_table
-    from tactile_lab.cli.running.sweep_cells import LINES_FILE, cell_of, row_of, run_sweep_cell
+    from tactile_lab.cli.running.sweep_cells import cell_of, row_of, run_sweep_cell
     from tactile_lab.evaluation.sweep import markdown_table, planned_runs, summaries, summary_cells, summary_titles
-    from tactile_lab.experiments.runner import RunnerSettings, run_cells
+    from tactile_lab.experiments.parquet import write_parquet
+    from tactile_lab.experiments.runner import LINES_FILE, RunnerSettings, run_cells
     from tactile_lab.workflow.sweeping import check_sweep
 
     del no_input
@@ -45,10 +61,13 @@ def sweep(
     drawn = _numbers(seeds, "--seeds", largest=LARGEST_SEED)
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
     cells = [cell_of(run, rig, str(method), grasps, check_replay) for run in runs]
-    work = partial(run_sweep_cell, root=out)
-    done = run_cells(
-        "sweep", cells, work, out / LINES_FILE, RunnerSettings(jobs), lambda row, *_: say(row_of(row).line())
-    )
+    folder = out.resolve()  # for workers, which stand elsewhere
+    others = tuple(each / LINES_FILE for each in merge or ())
+    settings = RunnerSettings(jobs, scheduler=scheduler, shared=folder, others=others)
+    work = partial(run_sweep_cell, root=folder if scheduler else out)
+    done = run_cells("sweep", cells, work, out / LINES_FILE, settings, lambda row, *_: say(row_of(row).line()))
+    if parquet is not None:
+        write_parquet(parquet, "sweep", done)
     rows = [row_of(row) for row in done]
     found = summaries(rows)
     if as_json:

@@ -10,10 +10,9 @@ import pytest
 
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.catalogue import EXPERIMENTS, experiment
-from tactile_lab.experiments.cells import Row
+from tactile_lab.experiments.cells import Row, execute
 from tactile_lab.experiments.experiment import REPORTED_SEEDS, Experiment
 from tactile_lab.experiments.reporting import write_report
-from tactile_lab.experiments.runner import execute
 from tactile_lab.experiments.studies.planar import METHODS
 
 TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
@@ -32,6 +31,17 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "figure-3.14": ({"shape": ["ellipse"], "noise": ["25"], "particles": ["500", "1000"]}, 4),
     "figure-3.15": ({"shape": ["rectangle"], "constraints": ["0", "4"]}, 6),
     "figure-3.16": ({"shape": ["rectangle"], "noise": ["50"], "method": ["thesis-pf", "particle, no graph"]}, 3),
+    "thesis-readings": ({"noise": ["25"], "shape": ["ellipse"], "part": ["likelihood"]}, 3),
+    "figure-2.5": ({"contacts": ["10"]}, None),
+    "figure-2.8": ({"shape": ["ellipse"], "model": ["prior zero", "prior sphere"]}, None),
+    "figure-2.9": ({"model": ["SE kernel", "edge features"]}, None),
+    "figure-2.11": ({"shape": ["cube-6"], "contacts": ["5"], "model": ["TP kernel"]}, None),
+    "figure-2.14": ({"shape": ["ellipse"]}, None),
+    "figure-2.15": ({"shape": ["sphere"], "model": ["TP kernel"]}, None),
+    "figure-3.11": ({"shape": ["ellipse"], "after": ["1", "4"], "method": ["joint"]}, None),
+    "figure-3.13": ({"shape": ["cylinder"], "after": ["1"]}, None),
+    "shape-models": ({"shape": ["rectangle"], "contacts": ["20"], "model": ["Nagata patches", "edge features"]}, None),
+    "shape-models-3d": ({"shape": ["sphere"], "model": ["point cloud"]}, None),
     "table-4.2": ({"candidates": ["10"], "policy": ["information", "clairvoyant"]}, 12),
     "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
