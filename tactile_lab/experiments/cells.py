@@ -15,6 +15,10 @@ Value: TypeAlias = str | int | float
 Setting: TypeAlias = tuple[tuple[str, Value], ...]
 
 
+FOLLOWED = ("ok", "complete", "partial", "ambiguous")
+"""Status of a run whose object could be followed, or that did what it should ("ok")."""
+
+
 @dataclass(frozen=True)
 class Cell:
     """One run.
@@ -60,8 +64,8 @@ class Row:
         """Why the run counts as failed, or ""."""
         if self.figures is None:
             return self.problem
-        if self.figures.get("status", "ok") != "ok":
-            return f"object {self.figures['status']}"
+        if (status := self.figures.get("status", "ok")) not in FOLLOWED:
+            return f"object {status}"
         registration = self.figures.get("registration_mm")
         if registration is not None and registration > FAILURE_LIMIT_MM:
             return f"registration above {FAILURE_LIMIT_MM:g} mm"

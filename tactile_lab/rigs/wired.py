@@ -89,7 +89,8 @@ def require_right_hand(rig: Rig) -> None:
     if (form := hand_form(rig)) != RIGHT_HAND:
         what = f"has a {form}: calibrations that move the hand are made for right hands with five fingers and a wrist"
         hint = (
-            "Measure the forearm's pose (calibrate forearm --method manual); keep the delivered joints and fingertips"
+            "Measure the forearm's pose by ruler (calibrate forearm --method manual) or give another program's pose "
+            "pairs (--from); keep the delivered joints and fingertips"
         )
         raise ConfigurationError(what, where=rig.source, hint=hint)
 
@@ -218,7 +219,7 @@ def _base_start(rig: Rig) -> dict[str, Any]:
 
 def _with_emulator(rig: Rig, finger: str, wiring: WireSettings) -> WireSettings:
     if not WIRES[wiring.wire].emulator_host:
-        fed = ", ".join(name for name in WIRES if WIRES[name].emulator_host)
+        fed = ", ".join(name for name, wire in WIRES.items() if wire.emulator_host)
         where = f"{rig.source}: wires.fingertips.{finger}"
         raise ConfigurationError(f"the simulated plant feeds only {fed} wires", where=where, hint=f"Use wire: {fed}")
     return wiring

@@ -13,14 +13,14 @@ import typer
 from tactile_lab.cli.completion import complete_object, complete_policy
 from tactile_lab.cli.options import (
     LARGEST_SEED,
-    METHOD_HELP,
     MOST_GRASPS,
     AllowUncalibrated,
     Json,
-    Method,
+    MethodName,
     NoInput,
     RigName,
 )
+from tactile_lab.cli.running.live_address import LIVE_PORT, Live, LiveAddress, LiveOrigin, LivePort
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 _GUIDED, _EXPLORATION = "Guided sessions", "Choice of the grasps"
@@ -58,7 +58,7 @@ def run(
         typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps.", show_default="from the rig, 16 on sim"),
     ] = None,
     dimension: Annotated[int, typer.Option(min=2, max=3, help="2: estimate a horizontal contour; 3: a surface.")] = 2,
-    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
+    method: MethodName = "joint",
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of the session.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the session's folder is created.")] = Path("runs"),
     notes: Annotated[str, typer.Option(help="Notes to store with the session.")] = "",
@@ -97,6 +97,9 @@ def run(
     listen: Listen = "127.0.0.1",
     token: Token = "",
     certificate: Certificate = None,
+    live: Live = False,
+    live_port: LivePort = LIVE_PORT,
+    live_origin: LiveOrigin = "",
     policy: Annotated[
         str | None,
         typer.Option(
@@ -157,6 +160,7 @@ def run(
             }
         )
     page = PageAddress.if_wanted(view, listen, view_port, token, certificate)
+    viewers = LiveAddress.if_wanted(live, rig, live_port, token, live_origin)
     way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
     request = SessionRequest(
         rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
@@ -166,7 +170,7 @@ def run(
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
     with (
         LiveProgress(title, live=not (guided or confirm), reasons=policy is not None) as progress,
-        attendance(way if guided else None, page, title) as present,
+        attendance(way if guided else None, page, viewers, title) as present,
     ):
         finished = run_session(request, progress, replace(present, approve=TerminalApproval()) if confirm else present)
     conclude(finished, as_json)

@@ -9,12 +9,11 @@ import typer
 
 from tactile_lab.cli.options import (
     LARGEST_SEED,
-    METHOD_HELP,
     MOST_GRASPS,
     MOST_JOBS,
     Json,
     Merge,
-    Method,
+    MethodName,
     NoInput,
     ParquetFile,
     RigName,
@@ -26,7 +25,7 @@ def sweep(
     objects: Annotated[str, typer.Option(help="Comma-separated object names, or 'all'.")] = "all",
     seeds: Annotated[str, typer.Option(help="Comma-separated random seeds.")] = "1,2,3",
     dimensions: Annotated[str, typer.Option(help="Comma-separated dimensions: 2, 3 or 2,3.")] = "2,3",
-    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
+    method: MethodName = "joint",
     grasps: Annotated[int, typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps per session.")] = 16,
     rig: RigName = "sim",
     jobs: Annotated[int, typer.Option(min=1, max=MOST_JOBS, help="Number of parallel sessions.")] = 2,
@@ -60,7 +59,7 @@ def sweep(
     chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
     drawn = _numbers(seeds, "--seeds", largest=LARGEST_SEED)
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
-    cells = [cell_of(run, rig, str(method), grasps, check_replay) for run in runs]
+    cells = [cell_of(run, rig, method, grasps, check_replay) for run in runs]
     folder = out.resolve()  # for workers, which stand elsewhere
     others = tuple(each / LINES_FILE for each in merge or ())
     settings = RunnerSettings(jobs, scheduler=scheduler, shared=folder, others=others)

@@ -97,6 +97,10 @@ class MotionCost:
         """Lengths of translation and rotation of each slip over their standard deviations, shape (k - 1, 2)."""
         return self._lengths(self._scale(rows))
 
+    def scaled_slips(self, rows: Array) -> Array:
+        """Each slip over its standard deviations, shape (k - 1, size)."""
+        return self._scale(rows)
+
     @property
     def _parts(self) -> list[int]:
         return [self._space.translations, self._space.size - self._space.translations]
