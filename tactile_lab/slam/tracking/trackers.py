@@ -11,7 +11,7 @@ from pydantic import Field as Limit
 from pydantic import model_validator
 
 from drivers.core.configuration import StrictModel
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from drivers.core.errors import ConfigurationError
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
 from tactile_lab.slam.shape.fields.settings import GpisSettings
@@ -63,8 +63,8 @@ class Tracker(Protocol):
     def refined(self) -> ContactMap:
         """The same with refinements that take too long for every step, for the shape shown between grasps."""
 
-    def predict(self, motion: Array) -> None:
-        """Move the belief by the hand's motion (eq. 3.7)."""
+    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
+        """Move the belief by the hand's motion (eq. 3.7), known as well as ``measured`` says."""
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Weight the belief by a grasp's contacts in the world (eq. 3.6); returns False if nothing fits."""
