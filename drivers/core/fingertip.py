@@ -74,6 +74,7 @@ class TipTouches:
         points_distal_m: contact points, shape (n, 3); zero where :attr:`is_certain` is false.
         normals_distal: unit normals out of the *object*, shape (n, 3); zero likewise.
         normal_forces_N: force along the normal, shape (n,); zero likewise.
+        forces_distal_N: force of the object on the fingertip, shape (n, 3); zero likewise.
         is_certain: whether the reading was that of one contact, shape (n,).
         is_void: whether the reading was no measurement (saturated, faulty), shape (n,).
     """
@@ -81,6 +82,7 @@ class TipTouches:
     points_distal_m: Array
     normals_distal: Array
     normal_forces_N: Array
+    forces_distal_N: Array
     is_certain: NDArray[np.bool_]
     is_void: NDArray[np.bool_]
 

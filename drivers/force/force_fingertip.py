@@ -176,7 +176,7 @@ class ForceTip:
 
     def touches(self, readings: Array, world_R_distal: Array) -> TipTouches:
         """See :meth:`~drivers.core.fingertip.ContinuousFingertip.touches`; the same checks as for a capture."""
-        is_void = ~np.isfinite(readings).all(axis=-1)
+        is_void = np.asarray(~np.isfinite(readings).all(axis=-1), dtype=bool)
         weights = -world_R_distal[:, 2] @ self._weight_from_down.T
         wrenches = (np.where(is_void[:, None], 0.0, readings - weights)) @ self._to_centre.T
         return tip_touches(wrenches, is_void, self.calibration, self._settings.plausibility)

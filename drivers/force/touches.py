@@ -33,6 +33,7 @@ def tip_touches(
         points_distal_m=np.where(certain[:, None], points_m, 0.0),
         normals_distal=np.where(certain[:, None], -contact.normal, 0.0),
         normal_forces_N=np.where(certain, forces_N * np.cos(contact.force_angle_rad), 0.0),
+        forces_distal_N=np.where(certain[:, None], wrenches[:, :3], 0.0),
         is_certain=certain,
         is_void=is_void,
     )

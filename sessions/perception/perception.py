@@ -40,11 +40,13 @@ class PerceptionSettings(StrictModel):
         minimum_force_N: a lighter touch does not count as a contact.
         odometry: "touch": a held object moves as the fingertips feel it, which also says how certain that is; "palm":
             it moves with the palm.
+        odometry_scale: factor of the standard deviations that odometry states; ``session slips`` measures it.
     """
 
     joint_sigma_rad: float = Field(default=float(np.radians(0.6)), ge=0.0)
     minimum_force_N: float = Field(default=0.1, ge=0.0)
     odometry: Literal["touch", "palm"] = "touch"
+    odometry_scale: float = Field(default=1.0, gt=0.0, le=100.0)
 
 
 class Perception:
@@ -93,7 +95,8 @@ class Perception:
         self._closing_start: HandGeometry | None = None
         self._probed = Probed()
         self._carried = HandOdometry()
-        self._carrying = HeldObject(self.fingertips if self.settings.odometry == "touch" else {}, form.side)
+        felt = self.fingertips if self.settings.odometry == "touch" else {}
+        self._carrying = HeldObject(felt, form.side, self.settings.odometry_scale)
 
     # --- samples -----------------------------------------------------------------------------------------------
 

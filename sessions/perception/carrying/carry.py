@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose2
+from numpy.typing import NDArray
 
 from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip
@@ -21,30 +22,36 @@ _FOOT_SHARE = 0.6
 evenly, less where the middle carries more.
 """
 _LEAST_FOOT_m, _LARGEST_FOOT_m = 0.01, 0.05
+_FAR_m, _FAR_rad = 0.004, float(np.deg2rad(5.0))
+"""A slip that a person should hear of: more than half of the rigs' usual ones."""
+_RESISTED_SHARES = (0.2, 0.6)
+"""Net force over the sum of normal forces: usual on a table, and where all fingertips slide the same way."""
+_RESISTS = 0.25
 _NO_HOLD_s = 0.05
 """Contacts may be missed for a few samples."""
 
 
 @dataclass(frozen=True)
 class CarryNoise:
-    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decision 48).
+    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decision 50).
 
     Attributes:
         least_m, least_rad: of any carry.
         spread: share of the differences between the answers of other assumptions about friction.
         slip_m, slip_rad: share of the slip itself.
         lying_m, lying_rad: what release and the next closing do to the object.
-        unseen: share of the hand's motion while fewer than two fingertips held the object, or one was not heard.
+        unseen: share of the hand's motion while fewer than two fingertips held the object, one was not heard, or the
+            object resisted.
     """
 
     least_m: float = 0.0003
     least_rad: float = float(np.deg2rad(0.06))
-    spread: float = 0.8
+    spread: float = 0.6
     slip_m: float = 0.03
     slip_rad: float = 0.015
-    lying_m: float = 0.0012
-    lying_rad: float = float(np.deg2rad(0.6))
-    unseen: float = 0.3
+    lying_m: float = 0.00045
+    lying_rad: float = float(np.deg2rad(0.4))
+    unseen: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,7 @@ class Carry:
         slip_m, slip_rad: motion of the object's middle relative to the palm, and its turn.
         loose_s: how long no fingertip touched the object.
         single_s: how long only one did.
+        resisted_N: force with which the object resisted, beyond what a table's friction explains; 0 if it did not.
         void: fingertips without valid readings for a while.
     """
 
@@ -66,7 +74,18 @@ class Carry:
     slip_rad: float
     loose_s: float
     single_s: float
+    resisted_N: float
     void: tuple[str, ...]
+
+    def in_words(self) -> str:
+        """What to tell a person who watches."""
+        slipped = f"slipped {1e3 * self.slip_m:.0f} mm, {np.degrees(self.slip_rad):.0f} degrees"
+        return "; ".join([slipped, *self.problems])
+
+    @property
+    def is_remarkable(self) -> bool:
+        """Whether it slipped far, or cannot be known well."""
+        return self.slip_m > _FAR_m or self.slip_rad > _FAR_rad or bool(self.problems)
 
     @property
     def problems(self) -> tuple[str, ...]:
@@ -76,6 +95,8 @@ class Carry:
             found.append(f"held by one fingertip for {self.single_s:.1f} s")
         if self.loose_s > _NO_HOLD_s:
             found.append(f"touched by no fingertip for {self.loose_s:.1f} s")
+        if self.resisted_N:
+            found.append(f"the object resisted with {self.resisted_N:.1f} N: is it jammed, or held by something?")
         return tuple(found)
 
 
@@ -85,10 +106,11 @@ class CarryOdometry:
     Args:
         fingertips: that tell their contacts while they move, by finger.
         side: of the hand.
+        scale: factor of the stated standard deviations.
     """
 
-    def __init__(self, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> None:
-        self._fingertips, self._side = fingertips, side
+    def __init__(self, fingertips: Mapping[str, ContinuousFingertip], side: Side, scale: float = 1.0) -> None:
+        self._fingertips, self._side, self._scale = fingertips, side, scale
         self._spans_m: list[float] = []
         self.noise = CarryNoise()
 
@@ -128,6 +150,7 @@ class CarryOdometry:
             slip_rad=float(abs(slip[2])),
             loose_s=loose_s,
             single_s=single_s,
+            resisted_N=_resisted_N(steps),
             void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
         )
 
@@ -138,7 +161,8 @@ class CarryOdometry:
         while_held_rad = noise.least_rad + noise.spread * far_rad + noise.slip_rad * abs(slip[2])
         parts_m = [while_held_m, noise.lying_m, noise.unseen * unseen[0]]
         parts_rad = [while_held_rad, noise.lying_rad, noise.unseen * unseen[1]]
-        return StepSigma(float(np.linalg.norm(parts_m)), float(np.linalg.norm(parts_rad)))
+        scaled = self._scale * np.linalg.norm(parts_m), self._scale * np.linalg.norm(parts_rad)
+        return StepSigma(float(scaled[0]), float(scaled[1]))
 
 
 def _other_assumptions(usual: Friction) -> Sequence[Friction]:
@@ -153,14 +177,30 @@ def _other_assumptions(usual: Friction) -> Sequence[Friction]:
     )
 
 
+def _resistance(steps: TipSteps) -> Array:
+    """How little the fingertips can be believed to stick in each step, 0 to 1, shape (n,): by their net force."""
+    share = np.linalg.norm(steps.net_forces_N, axis=1) / np.maximum(steps.forces_N.sum(axis=1), 1e-9)
+    low, high = _RESISTED_SHARES
+    return np.asarray(np.clip((share - low) / (high - low), 0.0, 1.0) ** 2)
+
+
+def _resisted_N(steps: TipSteps) -> float:
+    """Mean net force while the object resisted; 0 if it hardly did."""
+    resists = _resistance(steps) > _RESISTS
+    if steps.step_s @ resists < _NO_HOLD_s:
+        return 0.0
+    return float(np.linalg.norm(steps.net_forces_N[resists], axis=1).mean())
+
+
 def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip]) -> Array:
     """The hand's motion, metres and radians, in steps that too few fingertips tell of; shape (2,)."""
     wired = [finger in fingertips for finger in FINGERS]
     poorly = (steps.felt.sum(axis=1) < 2) | (steps.is_void & wired).any(axis=1)
+    doubt = np.maximum(poorly, _resistance(steps))
     moves = _planar_motions(steps.world_T_palm)
     shifts = np.einsum("nij,nj->ni", moves[:, :2, :2], centres_m) + moves[:, :2, 2] - centres_m
     turns = np.abs(np.arctan2(moves[:, 1, 0], moves[:, 0, 0]))
-    return np.array([np.linalg.norm(shifts, axis=1) @ poorly, turns @ poorly])
+    return np.array([np.linalg.norm(shifts, axis=1) @ doubt, turns @ doubt])
 
 
 def _planar_motions(frames: Array) -> Array:

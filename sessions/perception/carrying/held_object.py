@@ -21,11 +21,12 @@ class HeldObject:
     Args:
         fingertips: of the rig, by finger; none for no odometry.
         side: of the hand.
+        scale: factor of the stated standard deviations.
     """
 
-    def __init__(self, fingertips: Mapping[str, FingertipSensor], side: Side) -> None:
+    def __init__(self, fingertips: Mapping[str, FingertipSensor], side: Side, scale: float = 1.0) -> None:
         continuous = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
-        self._record, self._odometry = CarryRecord(continuous), CarryOdometry(continuous, side)
+        self._record, self._odometry = CarryRecord(continuous), CarryOdometry(continuous, side, scale)
         self._from_ns = 0
         self.carry: Carry | None = None
         """The last completed one; None if the fingertips told nothing."""

@@ -36,6 +36,7 @@ class TipSteps:
         normals: unit normals out of the object, shape (n, 5, 3).
         moves_m: motion of the fingertip's material at the contact, shape (n, 5, 3).
         forces_N: normal forces, shape (n, 5); zero without a contact that tells something.
+        net_forces_N: horizontal force of all fingertips on the object, shape (n, 2).
         is_void: fingertips without a valid reading, shape (n, 5).
         world_T_palm: at the beginning of each step and at the end of the last, shape (n + 1, 4, 4).
         step_s: length of a step, shape (n,).
@@ -45,6 +46,7 @@ class TipSteps:
     normals: Array
     moves_m: Array
     forces_N: Array
+    net_forces_N: Array
     is_void: NDArray[np.bool_]
     world_T_palm: Array
     step_s: Array
@@ -67,7 +69,7 @@ def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingerti
     frames, readings = world_T_distal[chosen], _smooth_known(samples.readings)[chosen[:-1]]
     shape = (len(chosen) - 1, len(FINGERS))
     points_m, normals, moves_m = (np.zeros((*shape, 3)) for _ in range(3))
-    forces_N, is_void = np.zeros(shape), np.ones(shape, dtype=bool)
+    forces_N, is_void, net_forces_N = np.zeros(shape), np.ones(shape, dtype=bool), np.zeros((shape[0], 2))
     for finger, tip in fingertips.items():
         at = FINGERS.index(finger)
         before, after = frames[:-1, at], frames[1:, at]
@@ -77,9 +79,10 @@ def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingerti
         normals[:, at] = _middle_normals(before, after, touches.normals_distal)
         steep = np.linalg.norm(normals[:, at, :2], axis=-1) > LARGEST_SLOPE
         forces_N[:, at] = np.where(touches.is_certain & steep, np.maximum(touches.normal_forces_N, 0.0), 0.0)
+        net_forces_N -= np.einsum("nij,nj->ni", before[:, :2, :3], touches.forces_distal_N)
         is_void[:, at] = touches.is_void
     seconds = np.diff(samples.stamps_ns[chosen]) / NANOSECONDS
-    return TipSteps(points_m, normals, moves_m, forces_N, is_void, world_T_palm[chosen], seconds)
+    return TipSteps(points_m, normals, moves_m, forces_N, net_forces_N, is_void, world_T_palm[chosen], seconds)
 
 
 def _transform(frames: Array, points: Array) -> Array:
