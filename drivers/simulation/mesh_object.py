@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import lru_cache
 from pathlib import Path
 
-import coacd
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.installed.extras import require_package
 from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
 from drivers.simulation.object_names import LYING, STANDING, posed_path
 
@@ -58,6 +58,9 @@ def convex_pieces(mesh: trimesh.Trimesh) -> tuple[Array, ...]:
 
 @lru_cache(maxsize=8)
 def _decompose(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
+    require_package("coacd")
+    import coacd
+
     coacd.set_log_level("error")
     surface = coacd.Mesh(np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(faces, np.int32).reshape(-1, 3))
     pieces = coacd.run_coacd(

@@ -8,20 +8,25 @@ links collide with table and object but not with each other.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-import mujoco
 import numpy as np
 from gtsam import Pose3, Rot3
 
 from drivers.core.contacts import Array
 from drivers.core.fingertip import TipBody
+from drivers.core.installed.extras import LazyPackage
 from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsule, Ellipsoid, Shape, mirror_shape
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad, joint_table
 from drivers.simulation.devices.geared_motors import DISTAL_COUPLING, motor_class
 from drivers.simulation.objects import Hull, ObjectModel, Piece
 from drivers.simulation.surfaces import GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
+
+if TYPE_CHECKING:
+    import mujoco
+else:
+    mujoco = LazyPackage("mujoco")
 
 TIMESTEP_s = 0.002
 BASE_JOINTS = ("base x", "base y", "base z", "base yaw", "base pitch", "base roll")

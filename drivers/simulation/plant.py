@@ -5,19 +5,25 @@ quantities.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import mujoco
 import numpy as np
 from gtsam import Pose2, Pose3, Rot3
 from numpy.typing import NDArray
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import FINGERS, Array
+from drivers.core.installed.extras import LazyPackage
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, joint_vector
 from drivers.shadow.model.motors import DRIVEN_JOINTS
 from drivers.simulation.hand_plant import TrueContact
 from drivers.simulation.model import BASE_JOINTS, BASE_LIMITS, TIMESTEP_s
+
+if TYPE_CHECKING:
+    import mujoco
+else:
+    mujoco = LazyPackage("mujoco")
 
 STEP_ns = round(TIMESTEP_s * NANOSECONDS)
 START_BASE = np.array([-0.32, 0.0, 0.36, 0.0, 0.0, 0.0])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from drivers.core.clock import NANOSECONDS
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import SessionError
+from drivers.core.installed.extras import require_package
 from sessions.exchange.sample_tables import SampleTables
 from sessions.exchange.table_files import picture_suffix, rows_of
 
@@ -30,12 +30,10 @@ def write_ros_bag(tables: SampleTables, folder: Path) -> int:
         ConfigurationError: rosbags is not installed.
         SessionError: the folder exists or cannot be written.
     """
-    try:
-        from rosbags.rosbag2 import Writer, WriterError
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        hint = f"Install it: python3 -m pip --python {sys.executable} install rosbags"
-        raise ConfigurationError("rosbags is not installed", where="session export --rosbag", hint=hint) from error
+    require_package("rosbags")
+    from rosbags.rosbag2 import Writer, WriterError
+    from rosbags.typesys import Stores, get_typestore
+
     store = get_typestore(Stores.ROS2_JAZZY)
     make = _Messages(store.types)
     try:

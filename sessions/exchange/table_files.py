@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import h5py
 import numpy as np
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import SessionError
+from drivers.core.installed.extras import LazyPackage
 from sessions.exchange.sample_tables import SampleTables, Table
+
+if TYPE_CHECKING:
+    import h5py
+else:
+    h5py = LazyPackage("h5py")
 
 PICTURES = "pictures"
 

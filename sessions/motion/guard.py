@@ -33,7 +33,7 @@ class Guard:
         """Look at the last cycle; whether the hand has met anything since the motion began."""
         tips = [finger for finger, load_N in self._motion.loads_N().items() if load_N > self._force_N]
         found = (*tips, *self._motion.bent(self._held_up_rad))
-        if self._links.is_touched(self._motion.motor_torques):
+        if self._links.is_touched(self._motion.motor_torques, self._motion.hand_stamp_ns):
             found = (*found, LINKS)
         self.met = tuple(dict.fromkeys((*self.met, *found)))
         return bool(self.met)

@@ -12,12 +12,12 @@ import numpy as np
 
 from drivers.core.contacts import Array
 
-_FIRST_CYCLES = 25
+_FIRST_READINGS = 25
 """Of a motion: it starts with a jerk."""
 
 _SIGMAS, _LEAST_COUNTS = 8.0, 250.0
-_CYCLES = 2
-"""In a row, so that a lone reading is no touch."""
+_READINGS = 2
+"""In a row: a lone one is no touch. A positioner that gets a target late jerks, and the wrist with it."""
 
 
 class LinkWatch:
@@ -29,15 +29,22 @@ class LinkWatch:
     def restart(self) -> None:
         """A new even motion begins."""
         self._seen, self._suspicious = 0, 0
+        self._stamp_ns: int | None = None
         self._mean: Array | None = None
         self._squares: Array | None = None
 
-    def is_touched(self, torques: Array | None) -> bool:
-        """Take one cycle's counts, shape (20,), None where the hand tells none; whether something pushes on a link."""
-        if torques is None:
-            return False
+    def is_touched(self, torques: Array | None, stamp_ns: int | None) -> bool:
+        """Take the newest reading; whether something pushes on a link.
+
+        Args:
+            torques: counts of all motors, shape (20,), None where the hand tells none.
+            stamp_ns: when it arrived. A reading that was judged before is not a second one that says so.
+        """
+        if torques is None or stamp_ns == self._stamp_ns:
+            return self._suspicious >= _READINGS
+        self._stamp_ns = stamp_ns
         self._seen += 1
-        if self._seen <= _FIRST_CYCLES:
+        if self._seen <= _FIRST_READINGS:
             return False
         if self._mean is None or self._squares is None:
             self._mean, self._squares = torques.astype(float), np.zeros(len(torques))
@@ -45,18 +52,18 @@ class LinkWatch:
         off = np.abs(torques - self._mean)
         if bool((off > np.maximum(_LEAST_COUNTS, _SIGMAS * self._sigma())).any()):
             self._suspicious += 1
-            return self._suspicious >= _CYCLES
+            return self._suspicious >= _READINGS
         self._suspicious = 0
         self._learn(torques)
         return False
 
     def _sigma(self) -> Array:
         assert self._squares is not None
-        return np.asarray(np.sqrt(self._squares / max(1, self._seen - _FIRST_CYCLES - 1)))
+        return np.asarray(np.sqrt(self._squares / max(1, self._seen - _FIRST_READINGS - 1)))
 
     def _learn(self, torques: Array) -> None:
         assert self._mean is not None
         assert self._squares is not None
         before = torques - self._mean
-        self._mean = self._mean + before / (self._seen - _FIRST_CYCLES)
+        self._mean = self._mean + before / (self._seen - _FIRST_READINGS)
         self._squares = self._squares + before * (torques - self._mean)

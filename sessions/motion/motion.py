@@ -68,7 +68,9 @@ class Motion:
         self._loads_N: dict[str, float] = {}
         self._resting_N: dict[str, float] = {}
         self.motor_torques: Array | None = None
-        """Strain-gauge counts of the motors in the last cycle, shape (20,); None where the hand tells none."""
+        """Newest strain-gauge counts of the motors, shape (20,); None where the hand tells none."""
+        self.hand_stamp_ns: int | None = None
+        """When the newest status of the hand arrived, session clock; None before the first."""
         self.tallest_m = 0.0
         """Height over the table of whatever may stand there, as far as it is known: the hand travels above it."""
 
@@ -121,7 +123,8 @@ class Motion:
     def _watched_cycle(self) -> None:
         self.runtime.cycle()
         snapshot = self.runtime.snapshot()
-        self._loads_N, self.motor_torques = dict(snapshot.loads_N), snapshot.motor_torques
+        self._loads_N = dict(snapshot.loads_N)
+        self.motor_torques, self.hand_stamp_ns = snapshot.motor_torques, snapshot.hand_stamp_ns
         self.supervisor.check(snapshot)
 
     def wait(self, duration_s: float) -> None:

@@ -50,6 +50,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
         complain(str(error))
         sys.exit(error.exit_code)
+    except ModuleNotFoundError as error:
+        from drivers.core.installed.extras import explain_missing
+        from tactile_lab.cli.console import complain
+
+        if (missing := explain_missing(error)) is None:
+            raise
+        complain(str(missing))
+        sys.exit(missing.exit_code)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
     except MemoryError:

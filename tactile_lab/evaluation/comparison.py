@@ -15,11 +15,14 @@ from typing import Any
 
 from tactile_lab.evaluation.spread import Interval, Spread
 
-FIGURES = (
+FIGURES: tuple[tuple[str, tuple[str | int, ...]], ...] = (
     ("Hausdorff at best fit, mm", ("shape_best_fit", "hausdorff_mm")),
     ("mean distance at best fit, mm", ("shape_best_fit", "mean_distance_mm")),
     ("position RMSE, mm", ("pose", "rmse_mm")),
     ("rotation RMSE, °", ("pose", "rmse_deg")),
+    ("aligned position RMSE (Umeyama), mm", ("pose_umeyama", "rmse_mm")),
+    ("poses inside their 95 % regions, share", ("consistency", "poses", "inside", 2)),
+    ("surface inside its 95 % band, share", ("consistency", "surface", "inside", 2)),
     ("registration, mm", ("registration_rms_mm",)),
     ("contact error, mm", ("sensing", "median_mm")),
 )
@@ -46,11 +49,14 @@ class EvaluatedRun:
         """The method, with the dimension."""
         return f"{self.evaluation['method']}, {self.evaluation['dimension']}-D"
 
-    def figure(self, keys: Sequence[str]) -> float | None:
-        """A metric by its keys; None if it is unknown."""
+    def figure(self, keys: Sequence[str | int]) -> float | None:
+        """A metric by its keys, numbers being places in lists; None if it is unknown."""
         value: Any = self.evaluation
         for key in keys:
-            value = value.get(key) if isinstance(value, Mapping) else None
+            if isinstance(key, int):
+                value = value[key] if isinstance(value, list) and key < len(value) else None
+            else:
+                value = value.get(key) if isinstance(value, Mapping) else None
         return None if value is None else float(value)
 
 
@@ -98,13 +104,17 @@ def _summary(method: str, group: Sequence[EvaluatedRun], first: Sequence[Evaluat
     )
 
 
-def _figure(title: str, keys: Sequence[str], group: Sequence[EvaluatedRun], first: Sequence[EvaluatedRun]) -> Figure:
+def _figure(
+    title: str, keys: Sequence[str | int], group: Sequence[EvaluatedRun], first: Sequence[EvaluatedRun]
+) -> Figure:
     known = [value for each in group if (value := each.figure(keys)) is not None]
     mean = Interval.of(known) if known else None
     return Figure(title, len(known), Spread.of_known(known), mean, _difference(keys, group, first))
 
 
-def _difference(keys: Sequence[str], group: Sequence[EvaluatedRun], first: Sequence[EvaluatedRun]) -> Interval | None:
+def _difference(
+    keys: Sequence[str | int], group: Sequence[EvaluatedRun], first: Sequence[EvaluatedRun]
+) -> Interval | None:
     """Mean difference to the first method over common sessions; None for the first method itself."""
     if group is first:
         return None
@@ -128,7 +138,7 @@ def rows_csv(runs: Sequence[EvaluatedRun]) -> str:
 
 
 def _columns() -> list[str]:
-    return [".".join(keys) for _, keys in FIGURES]
+    return [".".join(map(str, keys)) for _, keys in FIGURES]
 
 
 def table(summaries: Sequence[MethodSummary]) -> list[list[str]]:

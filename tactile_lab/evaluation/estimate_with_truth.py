@@ -88,7 +88,7 @@ class EstimateWithTruth:
             mesh = self.truth.mesh
             return (None, ()) if mesh is None else _surface(self.folder / name, mesh, truth_T_estimate)
         outline = true_outline(self.results, self.truth)
-        estimate = read_contour(self.folder / name)[:-1]
+        estimate = read_contour(self.folder / name).points_m
         return None if outline is None else compare_contour(estimate, outline, truth_T_estimate), ()
 
 

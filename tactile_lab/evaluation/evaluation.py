@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from drivers.core.errors import SessionError
+from tactile_lab.evaluation.consistency.figures import ConsistencyFigures
+from tactile_lab.evaluation.dimensions import Extent
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, Truth
 from tactile_lab.evaluation.figures import (
     LoopFigures,
@@ -25,9 +27,10 @@ from tactile_lab.evaluation.figures import (
 from tactile_lab.evaluation.files.plain import json_text, plain
 from tactile_lab.evaluation.files.results import read_results
 from tactile_lab.evaluation.result_warnings import result_warnings
+from tactile_lab.evaluation.standard_error import StandardErrors
 from tactile_lab.evaluation.trajectory import PoseErrors
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 DECIMALS = 6
 
 
@@ -39,6 +42,9 @@ class Evaluation:
         aligned: how the estimate's object frame was aligned with the truth's for ``shape`` and ``pose``.
         shape: errors with that alignment.
         shape_best_fit: errors after the best rigid alignment.
+        dimensions: length, width and, in space, height; None without a shape.
+        pose_umeyama: the field's standard trajectory error, see :mod:`tactile_lab.evaluation.standard_error`.
+        consistency: whether the stated uncertainties are true, see :mod:`tactile_lab.evaluation.consistency`.
         registration_rms_mm: see :func:`tactile_lab.evaluation.registration.registration_rms_mm`.
         symmetry_turns: rotations about the object's axis that leave it unchanged and do not count in the registration,
             see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`; None for none.
@@ -60,7 +66,10 @@ class Evaluation:
     shape: ShapeFigures | None
     shape_best_fit: ShapeFigures | None
     uncertainty: UncertaintyFigures | None
+    dimensions: tuple[Extent, ...] | None
     pose: PoseErrors | None
+    pose_umeyama: StandardErrors | None
+    consistency: ConsistencyFigures | None
     registration_rms_mm: float | None
     symmetry_turns: int | None
     sensing: SensingFigures | None

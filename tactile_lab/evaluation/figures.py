@@ -14,11 +14,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from drivers.core.registry import Registry
+from tactile_lab.evaluation.consistency.figures import consistency
+from tactile_lab.evaluation.dimensions import dimensions
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, seen_contacts
 from tactile_lab.evaluation.files.plain import plain
 from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.evaluation.shape import contact_distances_m, outline_distances_m
+from tactile_lab.evaluation.standard_error import StandardErrors, standard_errors
 from tactile_lab.evaluation.trajectory import PoseErrors, pose_errors
 from tactile_lab.slam.shape.metrics.metrics import ShapeErrors
 
@@ -30,7 +33,8 @@ class ShapeFigures:
     hausdorff_mm: float
     mean_distance_mm: float
     chamfer_mm: float
-    fscore_5mm: float
+    fscore_1mm: float
+    fscore_2mm: float
     iou: float
 
     @classmethod
@@ -42,7 +46,8 @@ class ShapeFigures:
             hausdorff_mm=1e3 * errors.hausdorff_m,
             mean_distance_mm=1e3 * errors.mean_distance_m,
             chamfer_mm=1e3 * errors.chamfer_m,
-            fscore_5mm=errors.fscore_5mm,
+            fscore_1mm=errors.fscore_1mm,
+            fscore_2mm=errors.fscore_2mm,
             iou=errors.iou,
         )
 
@@ -150,6 +155,10 @@ def _pose(estimate: EstimateWithTruth) -> PoseErrors | None:
     return pose_errors(estimate.poses, estimate.truth.world_T_object)
 
 
+def _pose_umeyama(estimate: EstimateWithTruth) -> StandardErrors | None:
+    return standard_errors(estimate.poses, estimate.truth.world_T_object)
+
+
 def _registration(estimate: EstimateWithTruth) -> float | None:
     return estimate.registration_rms_mm
 
@@ -201,7 +210,10 @@ def _truth(estimate: EstimateWithTruth) -> TruthFigures:
 FIGURES.register("shape", _shape)
 FIGURES.register("shape_best_fit", _shape_best_fit)
 FIGURES.register("uncertainty", _uncertainty)
+FIGURES.register("dimensions", dimensions)
 FIGURES.register("pose", _pose)
+FIGURES.register("pose_umeyama", _pose_umeyama)
+FIGURES.register("consistency", consistency)
 FIGURES.register("registration_rms_mm", _registration)
 FIGURES.register("symmetry_turns", _symmetry_turns)
 FIGURES.register("sensing", _sensing)

@@ -14,7 +14,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
-from drivers.core.poses import planar, transform_points
+from drivers.core.poses import planar, spatial, transform_points
 from tactile_lab.evaluation.prism import open_ring, signed_area_m2
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
 from tactile_lab.slam.shape.metrics.metrics import ShapeErrors, contour_errors, mesh_errors
@@ -28,10 +28,12 @@ class ShapeComparison:
     Attributes:
         first_grasp: aligned by the first grasp's true pose; None if that is unknown.
         best_fit: after the best rigid alignment.
+        truth_T_fitted: that alignment, from the estimate's object frame into the truth's.
     """
 
     first_grasp: ShapeErrors | None
     best_fit: ShapeErrors
+    truth_T_fitted: Pose3
 
 
 def compare_contour(contour_m: Array, truth_m: Array, truth_T_estimate: Pose3 | None) -> ShapeComparison:
@@ -47,7 +49,8 @@ def compare_contour(contour_m: Array, truth_m: Array, truth_T_estimate: Pose3 | 
     """
     start = None if truth_T_estimate is None else planar(truth_T_estimate)
     placed = None if start is None else contour_errors(contour_m, truth_m, start)
-    return ShapeComparison(placed, contour_errors(contour_m, truth_m, align_contours(contour_m, truth_m)))
+    fitted = align_contours(contour_m, truth_m)
+    return ShapeComparison(placed, contour_errors(contour_m, truth_m, fitted), spatial(fitted))
 
 
 def compare_mesh(mesh: TriangleMesh, truth: TriangleMesh, truth_T_estimate: Pose3 | None) -> ShapeComparison:
@@ -60,7 +63,7 @@ def compare_mesh(mesh: TriangleMesh, truth: TriangleMesh, truth_T_estimate: Pose
     """
     placed = None if truth_T_estimate is None else mesh_errors(mesh, truth, truth_T_estimate)
     fitted = align_meshes(mesh, truth, upright=True)
-    return ShapeComparison(placed, mesh_errors(mesh, truth, fitted))
+    return ShapeComparison(placed, mesh_errors(mesh, truth, fitted), fitted)
 
 
 def horizontal_outline(mesh: trimesh.Trimesh, height_m: float) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,7 +27,10 @@ def evaluation_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
     """Rows from the content of ``evaluation.json``; unknown values show as a dash."""
     rows = [
         *_shape_rows(evaluation.get("shape") or {}, evaluation.get("shape_best_fit") or {}),
+        *_size_rows(evaluation.get("dimensions") or ()),
         *_pose_rows(evaluation.get("pose") or {}),
+        _standard_row(evaluation.get("pose_umeyama") or {}),
+        *_consistency_rows(evaluation.get("consistency") or {}),
         *_run_rows(evaluation),
         *_further_rows(evaluation.get("further") or {}),
     ]
@@ -38,7 +41,8 @@ _SHAPE = (
     ("hausdorff_mm", "Hausdorff distance", "mm", 2, "largest distance, both directions"),
     ("mean_distance_mm", "Mean distance", "mm", 2, "mean of both directions"),
     ("chamfer_mm", "Chamfer distance", "mm", 2, "sum of both mean distances"),
-    ("fscore_5mm", "F-score at 5 mm", "", 3, "share of both surfaces within 5 mm"),
+    ("fscore_1mm", "F-score at 1 mm", "", 3, "share of both surfaces within 1 mm"),
+    ("fscore_2mm", "F-score at 2 mm", "", 3, "share of both surfaces within 2 mm"),
     ("iou", "Overlap", "", 3, "intersection over union"),
 )
 
@@ -47,6 +51,18 @@ def _shape_rows(first: Mapping[str, Any], best: Mapping[str, Any]) -> list[Evalu
     return [
         EvaluationRow(label, _text(first.get(key), digits), unit, f"{_text(best.get(key), digits)} at best fit; {note}")
         for key, label, unit, digits, note in _SHAPE
+    ]
+
+
+def _size_rows(extents: Sequence[Mapping[str, Any]]) -> list[EvaluationRow]:
+    return [
+        EvaluationRow(
+            str(extent["name"]).capitalize(),
+            f"{extent['mm']:.1f} \u00b1 {2 * extent['sigma_mm']:.1f}",
+            "mm",
+            f"with two standard deviations; true {_text(extent.get('true_mm'), 1)} mm",
+        )
+        for extent in extents
     ]
 
 
@@ -62,6 +78,41 @@ def _pose_row(label: str, unit: str, pose: Mapping[str, Any]) -> EvaluationRow:
         return EvaluationRow(label, UNKNOWN, "", NEEDS_TWO)
     note = f"RMS; {final} at the end, {step} between grasps, drift {drift} per grasp"
     return EvaluationRow(label, rmse, {"deg": "°"}.get(unit, unit), note)
+
+
+def _standard_row(errors: Mapping[str, Any]) -> EvaluationRow:
+    if not errors:
+        return EvaluationRow("Aligned position error", UNKNOWN, "", "needs the true pose at three grasps")
+    turned = "" if errors.get("rmse_deg") is None else f", {_text(errors['rmse_deg'], 2)}° RMS"
+    note = f"RMS after the best rigid alignment (Umeyama); largest {_text(errors.get('largest_mm'), 2)} mm{turned}"
+    return EvaluationRow("Aligned position error", _text(errors.get("rmse_mm"), 2), "mm", note)
+
+
+_JUDGED = (
+    ("poses", "Poses inside", "relative to the first grasp"),
+    ("poses_common", "Poses inside", "relative to the best common frame"),
+    ("surface", "Surface inside", "at best fit"),
+)
+
+
+def _consistency_rows(consistency: Mapping[str, Any]) -> list[EvaluationRow]:
+    """Coverage of each kind of statement that could be judged."""
+    levels = consistency.get("levels") or ()
+    stated = " / ".join(f"{100 * level:.0f}" for level in levels)
+    rows = []
+    for key, label, basis in _JUDGED:
+        if found := consistency.get(key):
+            inside = " / ".join(f"{100 * share:.0f}" for share in found["inside"])
+            rows.append(
+                EvaluationRow(label, inside, "%", f"of the stated {stated} % regions, {basis}; {_scored(found)}")
+            )
+    return rows
+
+
+def _scored(found: Mapping[str, Any]) -> str:
+    """Normalised error of poses or mean signed error of a surface, and the log score."""
+    own = f"NEES {_text(found['nees'], 2)}" if "nees" in found else f"mean error {found['signed_mm']:+.2f} mm"
+    return f"{own}, log score {_text(found['log_score'], 2)}"
 
 
 def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:

@@ -1,4 +1,4 @@
-"""The object's trajectory: its file, and its errors relative to the marker camera.
+"""Errors of the object's trajectory relative to the marker camera.
 
 The estimate's object frame is defined by the first grasp and independent of the frame of the object's model. One fixed
 transform relates them: the one that makes both agree at the first grasp for which both are known.
@@ -6,39 +6,18 @@ transform relates them: the one that makes both agree at the first grasp for whi
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
-from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.poses import rotation_angle_rad
-from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
-
-COLUMNS = ("stamp_s", *(f"world_T_object_{row}{column}" for row in range(4) for column in range(4)))
-"""Columns of ``trajectory.csv``: the stamp, then the 4 x 4 matrix row by row."""
 
 Poses = Sequence[Pose3 | None]
 """One ``world_T_object`` per grasp; None if unknown."""
-
-
-@dataclass(frozen=True)
-class Trajectory:
-    """The object's pose at each grasp.
-
-    Attributes:
-        stamps_s: time of each grasp, session clock, seconds.
-        world_T_object: pose at each grasp, or None if the grasp could not be registered.
-    """
-
-    stamps_s: tuple[float, ...]
-    world_T_object: tuple[Pose3 | None, ...]
 
 
 @dataclass(frozen=True)
@@ -82,60 +61,6 @@ class PoseErrors:
     drift_deg_per_grasp: float
     step_mm: float
     step_deg: float
-
-
-def trajectory_text(trajectory: Trajectory) -> str:
-    """``trajectory.csv`` as text: one line per grasp, with empty entries for unregistered grasps."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(COLUMNS)
-    for stamp, pose in zip(trajectory.stamps_s, trajectory.world_T_object, strict=True):
-        entries = [""] * 16 if pose is None else [repr(float(entry)) for entry in pose.matrix().ravel()]
-        writer.writerow([f"{stamp:.9f}", *entries])
-    return out.getvalue()
-
-
-def read_trajectory(path: Path) -> Trajectory:
-    """Read ``trajectory.csv``.
-
-    Raises:
-        SessionError: the file is missing or not in the format of :func:`trajectory_text`.
-    """
-    try:
-        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8")
-    except (OSError, ConfigurationError, UnicodeDecodeError) as error:
-        raise SessionError(
-            "trajectory cannot be read", where=str(path), hint="Replay the session to write its results"
-        ) from error
-    if text.partition("\n")[0].rstrip("\r") != ",".join(COLUMNS):  # before millions of lines of something else are read
-        raise SessionError(f"first line is not '{COLUMNS[0]}' and the 16 entries of world_T_object", where=str(path))
-    try:
-        rows = list(csv.reader(io.StringIO(text)))
-    except csv.Error as error:
-        raise SessionError(f"is not a table ({error})", where=str(path), hint="Replay the session") from error
-    placed = [_read_row(row, f"{path}, line {number}") for number, row in enumerate(rows[1:], start=2)]
-    return Trajectory(tuple(stamp for stamp, _ in placed), tuple(pose for _, pose in placed))
-
-
-def _read_row(row: list[str], where: str) -> tuple[float, Pose3 | None]:
-    if len(row) != len(COLUMNS):
-        raise SessionError(f"has {len(row)} entries instead of {len(COLUMNS)}", where=where)
-    try:
-        stamp = float(row[0])
-        if not any(row[1:]):
-            return stamp, None
-        matrix = np.array([float(entry) for entry in row[1:]]).reshape(4, 4)
-    except ValueError as error:
-        raise SessionError(f"contains an entry that is not a number ({error})", where=where) from error
-    return stamp, _rigid(matrix, where)
-
-
-def _rigid(matrix: Array, where: str) -> Pose3:
-    rotation = matrix[:3, :3]
-    orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) and np.linalg.det(rotation) > 0
-    if not (np.isfinite(matrix).all() and orthonormal and np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0])):
-        raise SessionError("is not a rigid transform", where=where)
-    return Pose3(matrix)
 
 
 def compared_grasps(estimate: Poses, truth: Poses) -> list[Compared]:

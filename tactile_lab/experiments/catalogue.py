@@ -6,7 +6,16 @@ from collections.abc import Mapping
 
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.studies import ablation, everyday, exploration, laboratory, planar, solids, thesis_figures
+from tactile_lab.experiments.studies import (
+    ablation,
+    everyday,
+    exploration,
+    laboratory,
+    planar,
+    solids,
+    thesis_drawings,
+    thesis_figures,
+)
 
 EXPERIMENTS: Mapping[str, Experiment] = {
     study.name: study
@@ -26,6 +35,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         thesis_figures.FIGURE_3_14,
         thesis_figures.FIGURE_3_15,
         thesis_figures.FIGURE_3_16,
+        thesis_figures.THESIS_READINGS,
+        *thesis_drawings.ALL,
         exploration.TABLE_4_2,
         exploration.TABLE_4_3,
         exploration.EXPLORATION_HAND,

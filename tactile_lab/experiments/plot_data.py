@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
 CURVES_KEY = "mark: median; band: up to the 90th percentile"
+DRAWINGS_KEY = "lines: outlines, to scale; dots: contacts"
 RANGES_KEY = "dot: median; thick line: up to the 90th percentile; thin line: up to the largest value"
 
 
@@ -91,6 +92,41 @@ class RangePanel:
 
 
 @dataclass(frozen=True)
+class Stroke:
+    """A drawn line.
+
+    Attributes:
+        name: in the legend.
+        points: x and y in millimetres.
+        closed: whether the last point joins the first.
+    """
+
+    name: str
+    points: tuple[tuple[float, float], ...]
+    closed: bool = True
+
+    @classmethod
+    def from_json(cls, found: Mapping[str, Any]) -> Self:
+        """The inverse of :func:`panel_json`. Raises KeyError, TypeError or ValueError."""
+        return cls(found["name"], _pairs(found["points"]), bool(found["closed"]))
+
+
+@dataclass(frozen=True)
+class DrawingPanel:
+    """Outlines and contacts drawn to scale; all panels of a plot have the same scale.
+
+    Attributes:
+        title: text above it.
+        strokes: the lines, from the bottom to the top.
+        dots: x and y of contacts in millimetres.
+    """
+
+    title: str
+    strokes: tuple[Stroke, ...]
+    dots: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
 class Plot:
     """Charts of one kind, side by side.
 
@@ -101,16 +137,15 @@ class Plot:
         width: width of the sheet, pixels.
     """
 
-    panels: tuple[CurvePanel | RangePanel, ...]
+    panels: tuple[CurvePanel | RangePanel | DrawingPanel, ...]
     columns: int = 2
     key: str = ""
     width: float = 920.0
 
     def as_json(self) -> dict[str, Any]:
         """Plain data; the inverse is :meth:`from_json`."""
-        kind = "curves" if isinstance(self.panels[0], CurvePanel) else "ranges"
         return {
-            "kind": kind,
+            "kind": _kinds[type(self.panels[0])],
             "columns": self.columns,
             "key": self.key,
             "panels": [panel_json(one) for one in self.panels],
@@ -131,16 +166,25 @@ def _range_panel(found: Mapping[str, Any]) -> RangePanel:
     return RangePanel(**{**found, "lines": tuple(map(Range.from_json, found["lines"]))})
 
 
-_panel_of: Mapping[str, Any] = {"curves": _curve_panel, "ranges": _range_panel}
+def _drawing_panel(found: Mapping[str, Any]) -> DrawingPanel:
+    return DrawingPanel(found["title"], tuple(map(Stroke.from_json, found["strokes"])), _pairs(found["dots"]))
 
 
-def panel_json(panel: CurvePanel | RangePanel) -> dict[str, Any]:
+def _pairs(found: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
+    return tuple((float(x), float(y)) for x, y in found)
+
+
+_panel_of: Mapping[str, Any] = {"curves": _curve_panel, "ranges": _range_panel, "drawings": _drawing_panel}
+_kinds: Mapping[type, str] = {CurvePanel: "curves", RangePanel: "ranges", DrawingPanel: "drawings"}
+
+
+def panel_json(panel: CurvePanel | RangePanel | DrawingPanel) -> dict[str, Any]:
     """A panel as plain data: numbers with four digits, infinity as a text, because JSON cannot represent it."""
     return {field.name: _plain(getattr(panel, field.name)) for field in fields(panel)}
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, Series | Range):
+    if isinstance(value, Series | Range | Stroke):
         return _plain(asdict(value))
     if isinstance(value, Mapping):
         return {name: _plain(part) for name, part in value.items()}

@@ -14,7 +14,17 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from tactile_lab.evaluation.spread import number
-from tactile_lab.experiments.plot_data import CURVES_KEY, RANGES_KEY, CurvePanel, Plot, Range, RangePanel, Series
+from tactile_lab.experiments.plot_data import (
+    CURVES_KEY,
+    RANGES_KEY,
+    CurvePanel,
+    DrawingPanel,
+    Plot,
+    Range,
+    RangePanel,
+    Series,
+)
+from tactile_lab.experiments.plot_drawings import drawings_svg
 from tactile_lab.experiments.plot_sheet import LETTER_px, Look, Sheet
 from tactile_lab.report.svg import Chart, Frame, tick_label
 
@@ -29,7 +39,10 @@ def draw(title: str, plot: Plot) -> str:
     """Draw the plot as an SVG file."""
     curves = [panel for panel in plot.panels if isinstance(panel, CurvePanel)]
     ranges = [panel for panel in plot.panels if isinstance(panel, RangePanel)]
+    drawings = [panel for panel in plot.panels if isinstance(panel, DrawingPanel)]
     sheet = Sheet(title, plot.width, min(plot.columns, len(plot.panels)), [panel.title for panel in plot.panels])
+    if drawings:
+        return drawings_svg(sheet, drawings, plot.key)
     return _curves_svg(sheet, curves, plot.key) if curves else _ranges_svg(sheet, ranges, plot.key)
 
 

@@ -2,7 +2,8 @@
 
 Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error; rotations
     of a solid about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
-    surface whose true error is within two stated standard deviations.
+    surface whose true error is within two stated standard deviations, and shares of surface and poses inside their
+    stated 50, 68 and 95 % regions (:mod:`tactile_lab.evaluation.consistency`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ import trimesh
 
 from drivers.core.contacts import Array
 from drivers.core.poses import spatial, transform_points
+from tactile_lab.evaluation.consistency.pose_covariance import covariances_in_world
+from tactile_lab.evaluation.consistency.poses import birth_frame, common_frame, pose_consistency
+from tactile_lab.evaluation.consistency.surfaces import SurfaceConsistency, mesh_consistency, outline_consistency
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.trajectory import Poses
 from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, stands, symmetry_turns
@@ -36,7 +40,8 @@ def contour_figures(contour: Contour | None, outline_m: Array) -> dict[str, Any]
     fit = align_contours(contour.points_m, outline_m)
     moved = transform_points(spatial(fit), np.pad(contour.points_m, ((0, 0), (0, 1))))[:, :2]
     covered = _within(distances_to_polygon(moved, outline_m), contour.sigma_m)
-    return _shape_figures(contour_errors(contour.points_m, outline_m, fit), covered, contour.is_closed)
+    judged = outline_consistency(contour.points_m, contour.sigma_m, outline_m, fit)
+    return _shape_figures(contour_errors(contour.points_m, outline_m, fit), covered, contour.is_closed, judged)
 
 
 def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: bool = True) -> dict[str, Any]:
@@ -47,7 +52,8 @@ def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: b
         return dict(NO_SHAPE)
     fit = align_meshes(mesh, truth, upright=upright)
     covered = _within(distances_to_mesh(transform_points(fit, mesh.vertices), truth), mesh.sigma_m)
-    return _shape_figures(mesh_errors(mesh, truth, fit), covered, mesh.is_closed)
+    judged = mesh_consistency(mesh, mesh.sigma_m, truth, fit)
+    return _shape_figures(mesh_errors(mesh, truth, fit), covered, mesh.is_closed, judged)
 
 
 def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
@@ -58,12 +64,29 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
         shape = mesh_figures(result.mesh, data.mesh, upright=all(map(stands, data.world_T_body)))
     return {
         **shape,
+        **pose_figures(data, result),
         "registration_mm": registration_mm(data, result.world_T_object, result.dimension),
         "status": result.status,
         "contacts": sum(len(grasp.contacts) for grasp in data.grasps),
         "untracked": sum(step.verdict == "untracked" for step in result.steps),
         "step_ms": [round(1e3 * seconds, 3) for seconds in result.step_seconds[1:]],
     }
+
+
+def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
+    """Stated pose covariances against the truth, in the first grasp's object frame and in the best common one."""
+    truth, turns = data.world_T_body, symmetry_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
+    poses, stated = modulo_symmetry(result.world_T_object, truth, turns), covariances_in_world(result)
+    figures: dict[str, Any] = {}
+    for name, frame in (("", birth_frame(poses, truth)), ("common_", common_frame(poses, truth))):
+        judged = pose_consistency(poses, stated, truth, frame)
+        if judged is not None:
+            figures |= {
+                f"{name}poses_inside": list(judged.inside),
+                f"{name}nees": [round(value, 4) for value in judged.nees],
+                f"{name}poses_log_score": judged.log_score,
+            }
+    return figures
 
 
 def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
@@ -78,11 +101,15 @@ def _within(errors_m: Array, sigma_m: Array) -> float:
     return float(np.mean(errors_m <= 2 * sigma_m))
 
 
-def _shape_figures(errors: ShapeErrors, covered: float, closed: bool) -> dict[str, Any]:
+def _shape_figures(errors: ShapeErrors, covered: float, closed: bool, judged: SurfaceConsistency) -> dict[str, Any]:
     return {
         "hausdorff_mm": 1e3 * errors.hausdorff_m,
         "mean_mm": 1e3 * errors.mean_distance_m,
         "iou": errors.iou,
         "within_2_sigma": covered,
         "closed": closed,
+        "fscore_1mm": errors.fscore_1mm,
+        "surface_inside": list(judged.inside),
+        "surface_log_score": judged.log_score,
+        "surface_signed_mm": judged.signed_mm,
     }

@@ -24,7 +24,9 @@ UNKNOWN = "–"
 LEAST_PAIRS, _DRAWS = 20, 2000
 """Smallest number of pairs for the interval of a ratio, and the number of bootstrap samples."""
 
-Kind: TypeAlias = Literal["spread", "mean", "estimate", "median", "pooled", "percent", "sum", "correlation", "paired"]
+Kind: TypeAlias = Literal[
+    "spread", "mean", "estimate", "median", "pooled", "percent", "sum", "correlation", "paired", "shares"
+]
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Column:
         kind: "spread" gives median / p90 / maximum, "median" the median, "mean" the mean, "pooled" median / p95 of all
             numbers in the lists of all runs, "percent" the mean of shares or flags, "sum" the total, "estimate" the
             mean with its standard error, "correlation" Pearson's of all pairs in the lists of all runs, "paired" the
-            mean difference to the same runs with nothing left out, with its bootstrap 95 % interval.
+            mean difference to the same runs with nothing left out, with its bootstrap 95 % interval, "shares" the mean
+            of each share in the lists of all runs.
         versus: the reference method, whose median is used for the ratio to add.
         most: larger values are clipped to this in differences, so that one hopeless run does not hide all others.
     """
@@ -253,6 +256,12 @@ def _percent(group: Group, column: Column) -> str:
     return f"{100 * sum(values) / len(values):.{column.digits}f} %" if values else UNKNOWN
 
 
+def _shares(group: Group, column: Column) -> str:
+    found = [shares for row in group.rows if (shares := (row.figures or {}).get(column.key))]
+    means = [sum(values) / len(values) for values in zip(*found, strict=True)]
+    return " / ".join(f"{100 * mean:.{column.digits}f}" for mean in means) or UNKNOWN
+
+
 def _sum(group: Group, column: Column) -> str:
     values = [value for value in group.values(column.key) if math.isfinite(value)]
     return number(sum(values), column.digits) if values else UNKNOWN
@@ -267,6 +276,7 @@ _SHOWN: Mapping[Kind, Callable[[Group, Column], str]] = {
     "pooled": _pool,
     "percent": _percent,
     "sum": _sum,
+    "shares": _shares,
 }
 
 
@@ -293,6 +303,8 @@ def _figure_json(group: Group, column: Column) -> Any:
         return {**group.spread(column.key).as_json(), "text": _estimate(group, column)}
     if column.kind == "paired":
         return [_of(row, column) for row in group.rows]
+    if column.kind == "shares":
+        return {"text": _shares(group, column)}
     if column.kind != "pooled":
         return group.spread(column.key).as_json()
     values = group.pool(column.key)

@@ -13,6 +13,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from drivers.core.errors import ConfigurationError
+from drivers.core.installed.extras import install_command
 from tactile_lab.models.solid_model import SolidModel
 
 try:
@@ -30,7 +31,7 @@ def write_usd(path: Path, model: SolidModel) -> None:
         ConfigurationError: package usd-core is not installed.
     """
     if not USD_INSTALLED:
-        hint = "Run: pip install 'tactile-lab[usd]', or choose other formats"
+        hint = f"Install it: {install_command('usd')}; or choose other formats"
         raise ConfigurationError("needs the package usd-core", where="--format usd", hint=hint)
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)

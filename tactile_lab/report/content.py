@@ -15,6 +15,7 @@ from drivers.core.poses import rotate, transform_points
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.evaluation.files.tables import ContactRows
 from tactile_lab.evaluation.trajectory import estimate_T_truth
+from tactile_lab.report.camera_picture import CameraView
 from tactile_lab.report.course import Course
 
 Faces = NDArray[np.int64]
@@ -54,6 +55,15 @@ class Surface:
     faces: Faces
     sigma_m: Array
     normals: Array | None = None
+
+
+def outward_normals(ring: Array) -> Array:
+    """Unit normals of a closed ring of points, pointing out of it, shape (n, 2)."""
+    tangent = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
+    normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12)
+    area = np.sum(ring[:, 0] * np.roll(ring[:, 1], -1) - ring[:, 1] * np.roll(ring[:, 0], -1))
+    return np.asarray(normal * np.sign(area))
 
 
 def with_plain_lids(surface: Surface) -> Surface:
@@ -99,6 +109,8 @@ class ReportContent:
         truth: ground truth, or None.
         fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
         course: decisions and stops of the session.
+        camera: the marker camera's last picture of a grasp, or None.
+        camera_problem: why there is none, "" for a session without camera.
     """
 
     facts: SessionFacts
@@ -110,6 +122,24 @@ class ReportContent:
     truth: TrueShape | None = None
     fitted_outline_m: Array | None = None
     course: Course = field(default_factory=Course)
+    camera: CameraView | None = None
+    camera_problem: str = ""
+
+    def pose_sigma(self, grasp: int) -> tuple[float | None, float | None]:
+        """Stated standard deviations of a grasp's position, millimetres, and rotation, degrees; None if unknown."""
+        covariances = self.results.trajectory.covariances
+        covariance = covariances[grasp] if covariances else None
+        if covariance is None:
+            return None, None
+        variances = np.diag(covariance)
+        return 1e3 * float(np.sqrt(variances[:3].sum())), float(np.degrees(np.sqrt(variances[3:].sum())))
+
+    def band_m(self) -> tuple[Array, ...]:
+        """The contour moved by two standard deviations outward and inward, each of shape (n, 2); empty if unknown."""
+        if self.contour_m is None or len(self.contour_sigma_m) != len(self.contour_m):
+            return ()
+        aside = 2.0 * self.contour_sigma_m[:, None] * outward_normals(self.contour_m)
+        return self.contour_m + aside, self.contour_m - aside
 
     @property
     def estimate_T_truth(self) -> Pose3 | None:

@@ -8,9 +8,10 @@ from gtsam import Pose3
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.poses import planar
 from tactile_lab.colours import hex_colour, viridis
-from tactile_lab.evaluation.trajectory import aligned_poses, pose_errors
+from tactile_lab.evaluation.trajectory import aligned_poses
 from tactile_lab.report.content import PlacedContacts, ReportContent
 from tactile_lab.report.svg import Chart, Frame, tick_label
+from tactile_lab.report.uncertainty_figures import ellipse_mm, grasp_ticks
 
 MAP_WIDTH = 500.0
 NORMAL_LENGTH_mm = 6.0
@@ -61,22 +62,12 @@ def _draw_contour(chart: Chart, content: ReportContent) -> None:
     if len(sigma_m) != len(ring):
         chart.path(ring, "estimate", closed=True)
         return
-    outward = _outward(ring)
-    half_width = 2e3 * sigma_m[:, None]
-    chart.area([ring + half_width * outward, (ring - half_width * outward)[::-1]], "band")
+    outer, inner = content.band_m()
+    chart.area([1e3 * outer, 1e3 * inner[::-1]], "band")
     high_mm = sigma_scale_mm(sigma_m)
     middle = (sigma_m + np.roll(sigma_m, -1)) / 2
     for start, end, colour in zip(ring, np.roll(ring, -1, axis=0), sigma_colours(middle, high_mm), strict=True):
         chart.segment(start, end, "contour", f"stroke:{colour}")
-
-
-def _outward(ring: Array) -> Array:
-    """Unit normals of a closed ring of points, pointing out of it, shape (n, 2)."""
-    tangent = np.roll(ring, -1, axis=0) - np.roll(ring, 1, axis=0)
-    normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True).clip(1e-12)
-    area = np.sum(ring[:, 0] * np.roll(ring[:, 1], -1) - ring[:, 1] * np.roll(ring[:, 0], -1))
-    return np.asarray(normal * np.sign(area))
 
 
 def _draw_contacts(chart: Chart, grasp: PlacedContacts) -> None:
@@ -99,41 +90,8 @@ def colour_bar(high_mm: float) -> str:
     return chart.text("Colour scale", f"Standard deviation of the surface from 0 to {tick_label(high_mm)} millimetres.")
 
 
-def error_over_grasps(content: ReportContent) -> tuple[str, str] | None:
-    """Position error in millimetres and rotation error in degrees at each grasp."""
-    if content.truth is None:
-        return None
-    errors = pose_errors(content.results.trajectory.world_T_object, content.truth.world_T_object)
-    if errors is None:
-        return None
-    table = np.array([[i + 1, error.mm, error.deg] for i, error in enumerate(errors.per_grasp) if error is not None])
-    grasps = len(content.results.trajectory.stamps_s)
-    return (
-        _series(table[:, [0, 1]], grasps, "position error, mm", "Position error over the grasps", "mm"),
-        _series(table[:, [0, 2]], grasps, "rotation error, °", "Rotation error over the grasps", "°"),
-    )
-
-
-def _series(points: Array, grasps: int, label: str, title: str, unit: str) -> str:
-    """A line with dots over the grasp numbers, from zero up."""
-    high = max(float(points[:, 1].max()) * 1.12, 1e-3)
-    chart = Chart(Frame(460, 230), (0.5, grasps + 0.5), (0.0, high))
-    chart.axes("grasp", label, x_ticks=_grasp_ticks(grasps))
-    base = np.array([[points[-1, 0], 0.0], [points[0, 0], 0.0]])
-    chart.area([np.concatenate([points, base])], "under")
-    chart.path(points, "estimate")
-    for number, value in points:
-        chart.dot((number, value), "mark", tip=f"grasp {number:.0f}: {value:.2f} {unit}")
-    return chart.text(title, f"Ends at {points[-1, 1]:.2f} {unit}, largest {points[:, 1].max():.2f} {unit}.")
-
-
-def _grasp_ticks(grasps: int) -> list[float]:
-    step = max(1, -(-grasps // 12))
-    return [float(number) for number in range(1, grasps + 1, step)]
-
-
 def trajectory_view(content: ReportContent) -> str | None:
-    """The object's pose on the table at each grasp: estimate and truth, with headings."""
+    """The object's pose on the table at each grasp: estimate with its two-sigma ellipse, and truth, with headings."""
     truth = content.truth.world_T_object if content.truth else (None,) * len(content.results.trajectory.stamps_s)
     estimate = content.results.trajectory.world_T_object
     shown = aligned_poses(estimate, truth)
@@ -144,6 +102,9 @@ def trajectory_view(content: ReportContent) -> str | None:
     corners = np.array([[1e3 * pose.x(), 1e3 * pose.y()] for pose in known])
     chart = Chart.map(460, corners, margin=0.18)
     chart.axes("x on the table, mm", "y on the table, mm")
+    for pose, covariance in zip(shown, content.results.trajectory.covariances, strict=False):
+        if pose is not None and covariance is not None:
+            chart.area([1e3 * np.array([pose.x(), pose.y()]) + ellipse_mm(covariance)], "band")
     _draw_path(chart, truth, "truth")
     _draw_path(chart, shown, "estimate")
     placed = sum(pose is not None for pose in shown)
@@ -176,7 +137,7 @@ def force_map(content: ReportContent) -> str | None:
         chart.label(0.45, row + 0.5, FINGER_NAMES[finger], "tick", "end", dy=3.5)
         for index, found in enumerate(forces):
             _force_cell(chart, index, row, finger, found.get(finger), float(largest))
-    for number in _grasp_ticks(grasps):
+    for number in grasp_ticks(grasps):
         chart.label(number, 0.0, tick_label(number), "tick", "middle", dy=15)
     chart.label((grasps + 1) / 2, 0.0, "grasp", "axis", "middle", dy=31)
     return chart.text("Contact forces", f"Force of every finger at every grasp, up to {largest:.2f} newton.")

@@ -18,9 +18,10 @@ from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.results import Results, read_results
 from tactile_lab.evaluation.files.tables import read_contour
+from tactile_lab.evaluation.files.trajectory_file import read_trajectory
 from tactile_lab.evaluation.shape import horizontal_outline
-from tactile_lab.evaluation.trajectory import read_trajectory
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, read_truth_mesh
+from tactile_lab.report.camera_picture import last_view
 from tactile_lab.report.content import ReportContent, SessionFacts, Surface, TrueShape, with_plain_lids
 from tactile_lab.report.course import read_course
 from tactile_lab.slam.shape.metrics.alignment import align_contours
@@ -45,6 +46,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
     surface = _surface(folder / "mesh.ply", results.dimension)
     contour_m, sigma_m = _outline(folder, results, surface)
     truth = _truth(session, folder, results)
+    camera, problem = last_view(session, results.trajectory.world_T_object)
     return ReportContent(
         facts=facts(session.manifest),
         results=results,
@@ -55,6 +57,8 @@ def gather(session: Session, folder: Path) -> ReportContent:
         truth=truth,
         fitted_outline_m=_fit(contour_m, truth),
         course=read_course(session),
+        camera=camera,
+        camera_problem=problem,
     )
 
 
@@ -118,8 +122,9 @@ def _outline(folder: Path, results: Results, surface: Surface | None) -> tuple[A
 def _contour(path: Path, results: Results) -> tuple[Array | None, Array]:
     if not path.is_file():
         return None, np.zeros(0)
-    sigma_m = results.slam.get("contour_sigma_m") or ()
-    return read_contour(path)[:-1], np.array(sigma_m, dtype=float)
+    outline = read_contour(path)
+    older = results.slam.get("contour_sigma_m") or ()  # where older results have them
+    return outline.points_m, outline.sigma_m if len(outline.sigma_m) else np.array(older, dtype=float)
 
 
 def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None:

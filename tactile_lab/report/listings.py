@@ -6,15 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from drivers.core.configuration import flatten_keys
 from tactile_lab.evaluation.loops import first_in_map
 from tactile_lab.evaluation.table import UNKNOWN, EvaluationRow, evaluation_rows
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent
 from tactile_lab.report.course import Course, PolicyDecision
+from tactile_lab.report.legend import legend
 from tactile_lab.report.markup import Markup, badge, element, figure, join, table
+from tactile_lab.report.uncertainty_figures import calibration_curve
 
 
 def number(value: float | None, digits: int = 1) -> str:
@@ -74,8 +74,7 @@ def _grasp_row(content: ReportContent, index: int) -> list[str | Markup]:
     results = content.results
     step: Mapping[str, Any] = _entry(results.slam["steps"], index)
     error: Mapping[str, Any] = _entry(((content.evaluation or {}).get("pose") or {}).get("per_grasp"), index)
-    covariances = results.slam.get("covariances") or ()
-    sigma_mm, sigma_deg = _pose_sigma(covariances[index] if index < len(covariances) else None)
+    sigma_mm, sigma_deg = content.pose_sigma(index)
     verdict = str(step.get("verdict", UNKNOWN))
     return [
         str(index + 1),
@@ -95,21 +94,22 @@ def _entry(entries: Sequence[Mapping[str, Any] | None] | None, index: int) -> Ma
     return (entries[index] if entries and index < len(entries) else None) or {}
 
 
-def _pose_sigma(covariance: Sequence[Sequence[float | None]] | None) -> tuple[float | None, float | None]:
-    """Standard deviations of position and heading, millimetres and degrees, from a covariance of (x, y, yaw)."""
-    if covariance is None or any(entry is None for row in covariance for entry in row):
-        return None, None
-    x, y, yaw = np.diag(np.array(covariance, dtype=float))
-    return 1e3 * float(np.sqrt(x + y)), float(np.degrees(np.sqrt(yaw)))
-
-
 def evaluation_section(content: ReportContent) -> Markup:
     """The evaluation as a table with the meaning of each metric."""
     parts = [element("h2", "Evaluation")]
     if content.evaluation is None:
         return join([*parts, element("p", "The session has not been evaluated. Run: tactile-lab evaluate SESSION")])
     rows = [_evaluation_row(row) for row in evaluation_rows(content.evaluation)]
-    return join([*parts, element("div", table(["figure", "value", "meaning"], rows, (0, 2)), class_="card")])
+    parts.append(element("div", table(["figure", "value", "meaning"], rows, (0, 2)), class_="card"))
+    curve = calibration_curve(content.evaluation.get("consistency") or {})
+    if curve is not None:
+        caption = (
+            "How much of the truth is inside what is stated with a probability: on the dotted line statements are "
+            "true, below it too bold, above it too shy."
+        )
+        keys = legend([("estimate", "surface"), ("truth", "poses")])
+        parts.append(element("div", figure(curve, caption, "Are the uncertainties true?", keys), class_="pair wide"))
+    return join(parts)
 
 
 def _evaluation_row(row: EvaluationRow) -> list[str | Markup]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -11,9 +11,11 @@ import numpy as np
 from tactile_lab.evaluation.table import UNKNOWN
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent, Surface
+from tactile_lab.report.legend import legend
 from tactile_lab.report.listings import loops_card, number
 from tactile_lab.report.markup import Markup, badge, element, figure, join, markup
 from tactile_lab.report.rendering import VIEWS, views
+from tactile_lab.report.uncertainty_figures import camera_picture, error_over_grasps
 from tactile_lab.report.viewer import surface_colours, viewer_data
 
 _STATUS = {"ok": ("tracked", "good"), "lost": ("object lost", "bad")}
@@ -67,13 +69,27 @@ def key_figures(content: ReportContent) -> Markup:
     tiles = [
         ("Hausdorff distance", number(shape.get("hausdorff_mm")), "mm", _best(best.get("hausdorff_mm"))),
         ("Mean distance", number(shape.get("mean_distance_mm")), "mm", _best(best.get("mean_distance_mm"))),
-        ("F-score at 5 mm", number(shape.get("fscore_5mm"), 3), "", _best(best.get("fscore_5mm"), 3, "")),
+        ("F-score at 1 mm", number(shape.get("fscore_1mm"), 3), "", _best(best.get("fscore_1mm"), 3, "")),
+        *_size_tiles(evaluation.get("dimensions") or ()),
         ("Position error", number(pose.get("rmse_mm")), "mm", _at_end(pose, "final_mm")),
         ("Rotation error", number(pose.get("rmse_deg")), "°", _at_end(pose, "final_deg")),
         ("Grasps", str(grasps), "", f"{placed} placed, {contacts} contacts"),
         ("SLAM step", number(time.get("step_ms_median"), 0), "ms", f"median; {number(time.get('total_s'))} s in total"),
     ]
     return element("dl", *(_tile(*tile) for tile in tiles), class_="strip")
+
+
+def _size_tiles(extents: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str, str]]:
+    """Estimated dimensions with two standard deviations, and the true ones below."""
+    return [
+        (
+            str(extent["name"]).capitalize(),
+            f"{extent['mm']:.1f} \u00b1 {2 * extent['sigma_mm']:.1f}",
+            "mm",
+            "two standard deviations" if extent.get("true_mm") is None else f"true {extent['true_mm']:.1f} mm",
+        )
+        for extent in extents
+    ]
 
 
 def _tile(name: str, value: str, unit: str, under: str) -> Markup:
@@ -133,22 +149,6 @@ def _scale(sigma_m: np.ndarray[Any, Any]) -> Markup:
     return element("div", "uncertainty σ, mm", scale, class_="scale")
 
 
-_SAMPLES = {
-    "contour": '<line class="contour" x1="3" y1="6" x2="21" y2="6" style="stroke:#21918c"/>',
-    "contour_band": '<rect class="band" x="1" y="1" width="22" height="10"/>',
-    "estimate": '<path class="estimate" d="M1 6H23"/>',
-    "truth-fit": '<path class="truth-fit" d="M1 6H23"/>',
-    "truth": '<path class="truth" d="M1 6H23"/>',
-    "contact": '<line class="normal" x1="6" y1="6" x2="21" y2="6"/><circle class="contact" cx="6" cy="6" r="4"/>',
-}
-
-
-def legend(keys: list[tuple[str, str]]) -> Markup:
-    """Samples of marks with their meaning."""
-    samples = [Markup(f'<svg viewBox="0 0 24 12" aria-hidden="true">{_SAMPLES[kind]}</svg>') for kind, _ in keys]
-    return element("ul", *map(lambda s, k: element("li", s, k[1]), samples, keys), class_="legend")
-
-
 def _surface_card(content: ReportContent, surface: Surface) -> Markup:
     high_mm = figures.sigma_scale_mm(surface.sigma_m)
     data = viewer_data(content, surface, high_mm).replace("</", "<\\/")
@@ -188,23 +188,45 @@ def _controls(content: ReportContent) -> Markup:
 
 def tracking_section(content: ReportContent) -> Markup:
     """Errors over the grasps and the object's path on the table."""
-    errors, way = figures.error_over_grasps(content), figures.trajectory_view(content)
+    errors, way = error_over_grasps(content), figures.trajectory_view(content)
+    keys = [("estimate", "error")] if content.truth is not None else []
+    keys += [("bound", "two stated standard deviations")] if content.results.trajectory.covariances else []
     cards = []
     if errors is not None:
         cards += [
-            figure(errors[0], "Distance between true and estimated object origin.", "Position"),
-            figure(errors[1], "Angle between true and estimated object frame.", "Rotation"),
+            figure(errors[0], "Distance between true and estimated object origin.", "Position", legend(keys)),
+            figure(errors[1], "Angle between true and estimated object frame.", "Rotation", legend(keys)),
         ]
     parts = [element("h2", "Tracking"), element("p", _tracking_lead(content), class_="lead")]
     if cards:
         parts.append(element("div", *cards, class_="pair"))
     if way is not None:
-        caption = "The short line at each pose is the object's heading; the large dot is the first grasp."
-        keys = legend([("estimate", "estimate"), ("truth", "marker camera")] if cards else [("estimate", "estimate")])
-        parts.append(
-            element("div", figure(way, caption, "On the table", keys), loops_card(content), class_="pair wide")
+        caption = (
+            "The short line at each pose is the object's heading; the large dot is the first grasp. Ellipses are two "
+            "stated standard deviations."
         )
+        seen = [("truth", "marker camera")] if content.truth is not None else []
+        shown = legend([("estimate", "estimate"), *seen])
+        parts.append(
+            element("div", figure(way, caption, "On the table", shown), loops_card(content), class_="pair wide")
+        )
+    parts.append(_picture_card(content))
     return join(parts)
+
+
+def _picture_card(content: ReportContent) -> Markup:
+    """The camera's last picture with the estimate in it, or why there is none; nothing without a camera."""
+    picture = camera_picture(content)
+    if content.camera is None or picture is None:
+        text = f"No picture of the camera can be shown: {content.camera_problem}"
+        return element("p", text, class_="note") if content.camera_problem else Markup("")
+    where = "on the table" if content.results.dimension == 2 else "at the height of the contacts"
+    caption = (
+        f"The outline is drawn {where}, where the estimated pose places it; thin lines are two standard deviations."
+    )
+    keys = legend([("estimate-seen", "estimate"), ("truth-seen", "truth, by the marker"), ("seen", "contacts")])
+    title = f"The camera's picture of grasp {content.camera.grasp + 1}"
+    return element("div", figure(picture, caption, title, keys), class_="pair wide")
 
 
 def _tracking_lead(content: ReportContent) -> str:

@@ -14,6 +14,7 @@ from viser import Icon, IconName
 from drivers.core.contacts import FINGERS
 from sessions.guided.operator import Ask
 from tactile_lab.colours import hex_colour, viridis
+from tactile_lab.view.plots import Plots
 from tactile_lab.view.scene import Scene, SIGMA_FULL_m
 
 Press = Callable[[Ask, str], None]
@@ -48,6 +49,7 @@ class Controls:
                 self._button(server, ask, label, icon, hint, press)
             self._note(server, press)
         self._history = server.gui.add_html("")
+        self._plots = Plots(server)
 
     def _button(
         self,
@@ -80,6 +82,7 @@ class Controls:
         """Update the panel."""
         self._status.content = status_html(scene)
         self._history.content = history_html(scene)
+        self._plots.draw(scene)
 
 
 def status_html(scene: Scene) -> str:

@@ -17,9 +17,10 @@ from collections.abc import Mapping
 from types import TracebackType
 from typing import Any, Literal, Self
 
+from drivers.camera.packet import picture_of
 from drivers.core.child_process import child_command, child_environment
 from drivers.core.errors import DeviceError
-from tactile_lab.view.scene import SHOWN_TOPICS
+from tactile_lab.view.scene import CAMERA_PACKETS, SHOWN_TOPICS
 
 QUEUE_LENGTH = 400
 """Size of the queue in messages: about ten seconds of a session."""
@@ -117,8 +118,8 @@ class PageTransport(ABC):
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Queue a message, without waiting."""
-        if topic not in SHOWN_TOPICS:
-            return
+        if topic not in SHOWN_TOPICS or (topic == CAMERA_PACKETS and not picture_of(data)):
+            return  # most of a camera's packets hold corners only
         content = {"topic": topic, "stamp_ns": stamp_ns, "dropped": self.dropped}
         line = json.dumps({**content, "data": base64.b64encode(data).decode()})
         try:

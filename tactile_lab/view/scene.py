@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 from gtsam import Pose3, Rot3
 
+from drivers.camera.packet import picture_of
 from drivers.core.contacts import Array
+from sessions.perception.interpreter import CAMERA_LINK
 from sessions.recording.traffic import schemas
+from tactile_lab.view.course import ShownCourse
 
 PALM = "palm"
 WIZARD_TOPIC = "/wizard"
@@ -74,6 +77,8 @@ class Scene:
         plan: the next grasp, as :meth:`sessions.motion.grasp_plan.GraspPlan.as_plain` gives it.
         steps: the estimator's verdict on each grasp.
         guide: the panel of a guided session.
+        course: forces over time, and uncertainty over the grasps.
+        picture: the camera's newest picture, encoded as JPEG or PNG.
         wizard: the panel of a calibration wizard: question, lines, tables.
         messages: the newest events.
         stamp_ns: session clock of the newest message.
@@ -91,6 +96,8 @@ class Scene:
     plan: dict[str, Any] = field(default_factory=dict)
     steps: dict[int, dict[str, Any]] = field(default_factory=dict)
     guide: dict[str, Any] = field(default_factory=dict)
+    course: ShownCourse = field(default_factory=ShownCourse)
+    picture: bytes = b""
     wizard: dict[str, Any] = field(default_factory=dict)
     messages: list[str] = field(default_factory=list)
     stamp_ns: int = 0
@@ -105,6 +112,9 @@ class Scene:
 
     def take(self, topic: str, data: bytes, stamp_ns: int) -> None:
         """Process one message; topics that are not shown are ignored. Raises ValueError for invalid content."""
+        if topic == CAMERA_PACKETS:
+            self._take_picture(data)
+            return
         read = _READERS.get(topic)
         if read is None:
             return
@@ -113,6 +123,14 @@ class Scene:
             read(self, json.loads(data))
         except (KeyError, TypeError, AttributeError, IndexError) as error:
             raise ValueError(f"{topic}: {error!r}") from error
+        if topic == schemas.LOADS_TOPIC:
+            self.course.take_forces(stamp_ns, self.loads_N)
+
+    def _take_picture(self, packet: bytes) -> None:
+        """Keep the picture in a packet of the camera, if it has one."""
+        if picture := picture_of(packet):
+            self.picture = picture
+            self.changed.add("picture")
 
 
 def _hand(scene: Scene, content: dict[str, Any]) -> None:
@@ -153,6 +171,7 @@ def _slam_state(scene: Scene, content: dict[str, Any]) -> None:
     index = int(content["index"])
     covariance = content.get("covariance")
     scene.covariance = None if covariance is None else np.array(covariance, dtype=float)
+    scene.course.take_pose(index, scene.covariance)
     scene.steps = {number: step for number, step in scene.steps.items() if number < index} | {index: content}
     placed = [_place(grasp, scene) if grasp.index == index else grasp for grasp in scene.grasps]
     scene.grasps = [grasp for grasp in placed if grasp.index <= index]
@@ -174,6 +193,7 @@ def _surface(scene: Scene, content: dict[str, Any]) -> None:
         explored=float(content["explored"]),
         origin_height_m=float(content["origin_height_m"]),
     )
+    scene.course.take_surface(scene.surface.sigma_m)
     scene.changed.add("object")
 
 
@@ -209,7 +229,8 @@ _READERS = {
     schemas.LOG_TOPIC: _event,
     WIZARD_TOPIC: _wizard,
 }
-SHOWN_TOPICS = frozenset(_READERS)
+CAMERA_PACKETS = schemas.received_topic(CAMERA_LINK)
+SHOWN_TOPICS = frozenset({*_READERS, CAMERA_PACKETS})
 """Whether a page needs this topic."""
 
 

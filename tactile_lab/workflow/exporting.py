@@ -17,6 +17,10 @@ from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, 
 from sessions.exchange.sample_tables import SampleTables, read_tables
 from sessions.perception.replay import Replay, kept_grasps
 from sessions.recording.session import Session
+from tactile_lab.evaluation.files.trajectory_file import read_trajectory
+from tactile_lab.evaluation.files.tum_file import tum_text
+from tactile_lab.evaluation.trajectory import aligned_poses
+from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -127,12 +131,40 @@ def _tables(session: Session) -> SampleTables:
     return read_tables(session.traffic(), build_interpreter(rig_of_session(session)))
 
 
+def export_tum(session: Session, folder: Path) -> int:
+    """Write the estimated trajectory, and the true one where it is known, as ``estimate.tum`` and ``truth.tum``.
+
+    The estimate is that of the truth's object frame, tied to the estimated one at the first common grasp; without truth
+    that of the estimated object frame. Gives the number of poses.
+
+    Raises:
+        SessionError: the session has no results.
+        WriteError: the folder cannot be written.
+    """
+    trajectory, truth_file = read_trajectory(session.results / "trajectory.csv"), session.results / TRUTH_TRAJECTORY
+    stamps_s, estimate = trajectory.stamps_s, trajectory.world_T_object
+    texts = {"estimate.tum": tum_text(stamps_s, estimate)}
+    truth = read_trajectory(truth_file).world_T_object if truth_file.is_file() else (None,) * len(stamps_s)
+    if len(truth) != len(stamps_s):
+        hint = "Evaluate the session again"
+        raise SessionError(f"has {len(truth)} poses instead of {len(stamps_s)}", where=str(truth_file), hint=hint)
+    if any(pose is not None for pose in truth):
+        texts = {
+            "estimate.tum": tum_text(stamps_s, aligned_poses(estimate, truth)),
+            "truth.tum": tum_text(stamps_s, truth),
+        }
+    for name, text in texts.items():
+        write_whole(folder / name, text)
+    return sum(text.count("\n") - 1 for text in texts.values())
+
+
 EXPORTS: Mapping[str, Callable[[Session, Path], int]] = {
     "csv": export_csv,
     "hdf5": export_hdf5,
     "rosbag": export_rosbag,
+    "tum": export_tum,
     "archive": export_archive,
 }
 """Ways to write a whole session, by name."""
-UNITS = {"csv": "rows", "hdf5": "rows", "rosbag": "messages", "archive": "files"}
+UNITS = {"csv": "rows", "hdf5": "rows", "rosbag": "messages", "tum": "poses", "archive": "files"}
 """What each of them counts."""

@@ -24,7 +24,7 @@ from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.files.results import read_results
-from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
+from tactile_lab.evaluation.files.trajectory_file import Trajectory, trajectory_text
 from tactile_lab.evaluation.truth.marker_truth import Basis, MarkerTruth, TruthReport
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY, camera_datagrams, session_truth
 from tactile_lab.rigs.description import OTHER_VERSION, Rig, rig_of_session

@@ -15,7 +15,7 @@ import yaml
 from scipy.stats import t as student
 
 from calibration.store.store import read_record, write_record
-from tactile_lab.evaluation.trajectory import COLUMNS
+from tactile_lab.evaluation.files.trajectory_file import COLUMNS
 from tactile_lab.rigs.description import load_rig
 from tests.system.conftest import call_inside
 

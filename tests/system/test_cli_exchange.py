@@ -186,6 +186,17 @@ def test_an_export_to_where_nothing_can_be_written_is_refused(inside, piece, rec
     refused(inside("session", "export", session, f"--{form}", tmp_path / "file" / "x"), 1, "cannot be written")
 
 
+def test_trajectories_are_exported_as_other_programs_read_them(inside, recorded, piece, tmp_path):
+    answer = inside("session", "export", recorded, "--tum", tmp_path / "tum")
+    assert answer.code == 0, answer.err
+    estimate, truth = (np.loadtxt(tmp_path / "tum" / f"{name}.tum") for name in ("estimate", "truth"))
+    assert estimate.shape == truth.shape == (2, 8)
+    assert np.linalg.norm(estimate[:, 4:], axis=1) == pytest.approx([1.0, 1.0])
+    assert estimate[0] == pytest.approx(truth[0], abs=1e-6)  # the object frames are tied there
+    refused(inside("session", "export", recorded, "--tum", tmp_path / "tum"), 2, "exists")
+    refused(inside("session", "export", piece, "--tum", tmp_path / "none"), 1, "trajectory cannot be read")
+
+
 def test_an_export_of_nothing_is_refused(inside, piece):
     answer = inside("session", "export", piece)
     assert (answer.code, answer.out) == (2, "")

@@ -15,7 +15,7 @@ from gtsam import Pose3
 from drivers.core.contacts import FINGERS, Contact, Grasp
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from tactile_lab.cli.options import Method
-from tactile_lab.evaluation.trajectory import read_trajectory
+from tactile_lab.evaluation.files.trajectory_file import read_trajectory
 from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.slam.shape.selection.models import SHAPE_MODELS
 
@@ -72,7 +72,7 @@ def test_a_planar_log_is_reconstructed_and_judged(inside, planar_log, tmp_path):
     assert document["shape"]["mean_distance_mm"] >= document["shape_best_fit"]["mean_distance_mm"] - 0.5
     assert document["truth"] == {"seen": 6, "missing": 0, "mesh": True}
     assert json.loads((tmp_path / "out" / "evaluation.json").read_text()) == document
-    ring = np.loadtxt(tmp_path / "out" / "contour.csv", delimiter=",", skiprows=1)
+    ring = np.loadtxt(tmp_path / "out" / "contour.csv", delimiter=",", skiprows=1, usecols=(0, 1))
     np.testing.assert_array_equal(ring[0], ring[-1])
     assert len(read_trajectory(tmp_path / "out" / "trajectory.csv").world_T_object) == 6
 
@@ -378,6 +378,6 @@ def test_a_jump_of_ten_centimetres_is_not_built_into_the_shape(inside, planar_lo
     document = reconstructed(inside, changed(planar_log, tmp_path, jumped), *options)
     steps = json.loads((tmp_path / "out" / "slam.json").read_text())["steps"]
     assert steps[3]["verdict"] in {"uncertain", "untracked"}
-    ring = np.loadtxt(tmp_path / "out" / "contour.csv", delimiter=",", skiprows=1)
+    ring = np.loadtxt(tmp_path / "out" / "contour.csv", delimiter=",", skiprows=1, usecols=(0, 1))
     if np.ptp(ring, axis=0).max() > 0.16:  # the thesis's own shape model from three grasps
         honest(document)

@@ -12,7 +12,7 @@ EVALUATION_KEYS = {
     "schema_version", "method", "seed", "object", "grasps", "contacts", "shape", "pose", "loops", "time", "status",
     "aligned", "shape_best_fit",
 }  # fmt: skip
-SHAPE_KEYS = {"hausdorff_mm", "mean_distance_mm", "chamfer_mm", "fscore_5mm", "iou"}
+SHAPE_KEYS = {"hausdorff_mm", "mean_distance_mm", "chamfer_mm", "fscore_1mm", "fscore_2mm", "iou"}
 POSE_KEYS = {"rmse_mm", "rmse_deg", "final_mm", "final_deg", "per_grasp"}
 REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", "slam.json")
 

@@ -97,7 +97,6 @@ def run_killing(rig: Rig, laboratory: WiredLaboratory, root: Path, device: str) 
         host.await_ready()
 
 
-@pytest.mark.long  # beside other tests on two cores its approaches are found blocked now and then
 def test_a_session_is_completed_and_replays_to_the_same_grasp(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path
 ) -> None:

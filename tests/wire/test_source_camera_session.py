@@ -21,7 +21,7 @@ from drivers.simulation.objects import object_model
 from drivers.simulation.world import marker_settings
 from sessions.conductor.progress import NullProgress
 from sessions.recording.session import Session
-from tactile_lab.evaluation.trajectory import read_trajectory
+from tactile_lab.evaluation.files.trajectory_file import read_trajectory
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.workflow import running

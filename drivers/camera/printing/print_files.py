@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from drivers.camera.printing.print_layout import Area, Line, Sheet
+from drivers.core.installed.extras import require_package
 
 _CUT_GREY = 150
 _POINTS_PER_mm = 72.0 / 25.4
@@ -41,6 +42,7 @@ def _svg_line(line: Line) -> str:
 
 def pdf_bytes(sheet: Sheet) -> bytes:
     """The sheet as PDF, made for printing at 100 %: viewers are told not to scale it."""
+    require_package("fpdf")
     from fpdf import FPDF, ViewerPreferences
     from fpdf.drawing import PaintedPath
     from fpdf.enums import IntersectionRule, PathPaintRule

@@ -21,8 +21,9 @@ from drivers.simulation.world import SimulatedWorld
 PRIORITY = 70
 """Scheduling priority, if permitted: the physics takes precedence over all else but the hand's frames."""
 
-_LONGEST_ns = 100_000_000
-"""The longest delay that the physics catches up with; the rest of a longer one is skipped and counted."""
+_LONGEST_ns = 20_000_000
+"""The longest delay that the physics catches up with; the rest of a longer one is skipped and counted. Whoever reads
+the sensors sees the world jump by it: no joint may turn farther in it than one can from reading to reading."""
 
 _LOOK_EVERY = 50
 

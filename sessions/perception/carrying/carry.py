@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from gtsam import Pose2
-from numpy.typing import NDArray
 
 from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip

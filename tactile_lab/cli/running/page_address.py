@@ -79,9 +79,11 @@ class PageAddress:
 
         There is a token always: on this computer, too, other users' programs could press the buttons.
         """
+        from drivers.core.installed.extras import require_package
         from tactile_lab.view.certificates import load_certificate
         from tactile_lab.view.gate import new_token
 
+        require_package("viser")
         token = new_token() if self.token in ("", "new") else self.token
         if len(token) < LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token) or not token.isascii():
             text = f"a token needs at least {LEAST_TOKEN} letters, digits, - or _"

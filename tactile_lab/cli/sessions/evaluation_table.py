@@ -18,8 +18,14 @@ _SHAPE = (
     ("Hausdorff distance", "hausdorff_mm", 2, "mm", "maximum, both directions"),
     ("Mean distance", "mean_distance_mm", 2, "mm", "both directions"),
     ("Chamfer distance", "chamfer_mm", 2, "mm", "sum of both directions"),
-    ("F-score at 5 mm", "fscore_5mm", 3, "  ", "both surfaces"),
+    ("F-score at 1 mm", "fscore_1mm", 3, "  ", "both surfaces"),
+    ("F-score at 2 mm", "fscore_2mm", 3, "  ", "both surfaces"),
     ("Overlap", "iou", 3, "  ", "intersection over union"),
+)
+_JUDGED = (
+    ("poses", "Poses, first grasp"),
+    ("poses_common", "Poses, common frame"),
+    ("surface", "Surface, best fit"),
 )
 _POSE = (("Position error", "mm", "mm"), ("Rotation error", "deg", "° "))
 
@@ -33,7 +39,7 @@ def show_evaluation(content: Mapping[str, Any]) -> None:
         f"Evaluation of {content['object']} ({made}; {basis})",
         "bold",
     )
-    for grid in (_shape(content), _pose(content.get("pose") or {}), _rest(content)):
+    for grid in (_shape(content), _pose(content.get("pose") or {}), *_consistency(content), _rest(content)):
         answers().print()
         answers().print(grid)
     answers().print()
@@ -55,6 +61,19 @@ def _pose(pose: Mapping[str, Any]) -> Table:
     return grid
 
 
+def _consistency(content: Mapping[str, Any]) -> list[Table]:
+    """How often the truth is inside the stated regions; nothing without the truth."""
+    judged = content.get("consistency") or {}
+    known = [(label, judged[key]) for key, label in _JUDGED if judged.get(key)]
+    if not known:
+        return []
+    grid = _grid(("truth inside the stated", *(f"{100 * level:.0f} %" for level in judged["levels"])), "")
+    for label, found in known:
+        scored = f"NEES {found['nees']:.2f}" if "nees" in found else f"mean error {found['signed_mm']:+.2f} mm"
+        grid.add_row(label, *(f"{100 * share:.0f} %" for share in found["inside"]), scored)
+    return [grid]
+
+
 def _rest(content: Mapping[str, Any]) -> Table:
     sensing, loops, time, truth = (content.get(key) or {} for key in ("sensing", "loops", "time", "truth"))
     share = f"from the true surface, 95 % below {_figure(sensing.get('p95_mm'), 'mm')}"
@@ -62,6 +81,8 @@ def _rest(content: Mapping[str, Any]) -> Table:
     seen = f"of {count(content['grasps'], 'grasp')} known"
     grid = _grid(("other metrics", ""), "")
     grid.add_row("Registration error", _figure(content.get("registration_rms_mm"), "mm"), _verdict(content))
+    aligned = content.get("pose_umeyama") or {}
+    grid.add_row("Aligned position error", _figure(aligned.get("rmse_mm"), "mm"), "RMS after rigid alignment (Umeyama)")
     grid.add_row("Contact error, median", _figure(sensing.get("median_mm"), "mm"), share)
     if loops.get("tested"):
         wrong = f"accepted of {_count(loops['tested'])} tested, {_count(loops.get('wrong'))} of them wrong"

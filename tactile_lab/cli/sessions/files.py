@@ -45,6 +45,10 @@ def export(
     rosbag: Annotated[
         Path | None, typer.Option(help="Write a ROS 2 bag to this new folder (needs the package rosbags).")
     ] = None,
+    tum: Annotated[
+        Path | None,
+        typer.Option(help="Write the estimated and the true trajectory to this new folder, in TUM's text format."),
+    ] = None,
     archive: Annotated[Path | None, typer.Option(help="Write the whole session to this new ZIP file.")] = None,
     root: Root = Path("runs"),
     dimension: Annotated[
@@ -62,9 +66,11 @@ def export(
     from tactile_lab.workflow import exporting
 
     del no_input
-    if not any((contacts, csv, hdf5, rosbag, archive)):
-        raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --archive")
-    refuse_existing([place for place in (contacts, csv, hdf5, rosbag, archive) if place is not None])
+    kinds = {"csv": csv, "hdf5": hdf5, "rosbag": rosbag, "tum": tum, "archive": archive}
+    places = [place for place in (contacts, *kinds.values()) if place is not None]
+    if not places:
+        raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --tum, --archive")
+    refuse_existing(places)
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
@@ -72,7 +78,7 @@ def export(
         answer(f"{count(log.grasps, 'grasp')} with {count(log.contacts, 'contact')}: {contacts}")
         if log.vertical:
             say(f"left out: {count(log.vertical, 'contact')} from above, which the plane does not have (--dimension 3)")
-    for kind, place in (("csv", csv), ("hdf5", hdf5), ("rosbag", rosbag), ("archive", archive)):
+    for kind, place in kinds.items():
         if place is not None:
             written = exporting.EXPORTS[kind](found, place)
             told |= {kind: str(place), f"{kind}_written": written}

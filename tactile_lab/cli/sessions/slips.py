@@ -92,7 +92,11 @@ def _show(found: Slips, sessions: list[str]) -> None:
     from tactile_lab.evaluation.slips import LEAST_STEPS
 
     titles = ["the object was", "steps", "mm, rms", "mm", "°, rms", "°"]
-    rows = [_row("carried", found.carried), _row("left in place", found.left), _row("carried, as felt", found.felt.missed)]
+    rows = [
+        _row("carried", found.carried),
+        _row("left in place", found.left),
+        _row("carried, as felt", found.felt.missed),
+    ]
     title = f"Slips in {count(len(sessions), 'session')} (rms per axis; median / p90 / maximum)"
     show_table(title, titles, rows, right=(1, 2, 3, 4, 5))
     if len(found.felt.missed):

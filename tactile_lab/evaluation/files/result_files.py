@@ -1,9 +1,9 @@
 """The files that a session's SLAM writes to ``results/``.
 
 ==================  ===============================================================================
-``trajectory.csv``  stamp and 16 entries of ``world_T_object`` a grasp; empty where not placed
+``trajectory.csv``  stamp, 16 entries of ``world_T_object`` and its covariance a grasp; empty where not placed
 ``contacts.csv``    every contact in the world frame, with its grasp, finger, force and uncertainty
-``contour.csv``     dimension 2: the outer contour in the object frame, closed
+``contour.csv``     dimension 2: the outer contour in the object frame, closed, with its standard deviation
 ``mesh.ply/.glb``   the shape in the object frame with per-vertex ``sigma_m``; in dimension 2 the contour
                     extruded from the table to the highest contact
 ``known.csv/.ply``  on wish: the parts of the contour or surface whose standard deviation is small enough
@@ -24,11 +24,12 @@ import numpy as np
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array, Grasp
+from tactile_lab.evaluation.consistency.pose_covariance import covariances_in_world
 from tactile_lab.evaluation.files.mesh_io import write_glb, write_ply
 from tactile_lab.evaluation.files.plain import json_text, plain
 from tactile_lab.evaluation.files.tables import NANOSECOND_s, contacts_text, contour_text, pieces_text
+from tactile_lab.evaluation.files.trajectory_file import Trajectory, trajectory_text
 from tactile_lab.evaluation.prism import Triangles, open_ring, prism
-from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
 from tactile_lab.slam.result import SlamResult, SlamStep
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, supported_mesh, supported_pieces
 
@@ -57,10 +58,11 @@ def write_results(
         WriteError: the folder cannot be written.
     """
     stamps_s = tuple(grasp.stamp_ns * NANOSECOND_s for grasp in grasps)
+    trajectory = Trajectory(stamps_s, tuple(result.world_T_object), covariances_in_world(result))
     texts = {
-        "trajectory.csv": trajectory_text(Trajectory(stamps_s, tuple(result.world_T_object))),
+        "trajectory.csv": trajectory_text(trajectory),
         "contacts.csv": contacts_text(grasps),
-        **({} if result.contour is None else {"contour.csv": contour_text(result.contour.points_m)}),
+        **({} if result.contour is None else {"contour.csv": contour_text(*_ring_with_sigma(result.contour))}),
         **_known_contour(result, largest_sigma_m),
         "slam.json": json_text(_slam_record(result, settings or {})),
         "timing.json": json_text({"schema_version": SCHEMA_VERSION, "step_seconds": result.step_seconds}),
@@ -140,7 +142,6 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "covariances": result.covariances,
         "loops": result.loops,
         "sigma_quantiles_m": _sigma_quantiles(result),
-        "contour_sigma_m": None if result.contour is None else _ring_with_sigma(result.contour)[1],
     }
 
 

@@ -13,7 +13,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import SessionError
 from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.tables import RERUN, ContactRows, read_contacts
-from tactile_lab.evaluation.trajectory import Trajectory, read_trajectory
+from tactile_lab.evaluation.files.trajectory_file import Trajectory, read_trajectory
 
 
 @dataclass(frozen=True)

@@ -13,13 +13,14 @@ import numpy as np
 from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
-from tactile_lab.evaluation.prism import open_ring
 
 NANOSECOND_s = 1e-9
 CONTACT_COLUMNS = (
     *("grasp", "stamp_s", "finger", "x_world_m", "y_world_m", "z_world_m"),
     *("normal_x_world", "normal_y_world", "normal_z_world", "point_sigma_m", "normal_sigma_rad", "force_N"),
 )
+CONTOUR_COLUMNS = ("x_m", "y_m", "sigma_m")
+_LEAST_CORNERS = 3
 RERUN = "Replay the session to write its results"
 
 
@@ -91,10 +92,13 @@ def _contact_rows(rows: list[list[str]]) -> ContactRows:
     return ContactRows(tuple(row[0] for row in rows), table[:, :3], table[:, 3:6], *table[:, 6:].T)
 
 
-def contour_text(points_m: Array) -> str:
-    """``contour.csv`` of a contour of shape (n, 2), object frame: x_m, y_m, the first point repeated at the end."""
-    ring = open_ring(points_m)
-    return _csv_text(("x_m", "y_m"), [[repr(float(x)), repr(float(y))] for x, y in [*ring, ring[0]]])
+def contour_text(ring_m: Array, sigma_m: Array) -> str:
+    """``contour.csv`` of a closed contour of shape (n, 2), object frame, and its standard deviations, shape (n,).
+
+    The first point is repeated at the end.
+    """
+    rows = [[repr(float(value)) for value in (*point, sigma)] for point, sigma in zip(ring_m, sigma_m, strict=True)]
+    return _csv_text(CONTOUR_COLUMNS, [*rows, rows[0]])
 
 
 def pieces_text(pieces_m: Sequence[Array]) -> str:
@@ -103,23 +107,41 @@ def pieces_text(pieces_m: Sequence[Array]) -> str:
     return _csv_text(("piece", "x_m", "y_m"), rows)
 
 
-def read_contour(path: Path) -> Array:
-    """Read ``contour.csv``: points of the outer contour, shape (n, 2), object frame, the first one repeated.
+@dataclass(frozen=True)
+class ContourRows:
+    """The outline as in ``contour.csv``, object frame, counter-clockwise, the first point not repeated.
+
+    Attributes:
+        points_m: shape (n, 2).
+        sigma_m: standard deviation along the normal, shape (n,); of shape (0,) in results of older versions.
+    """
+
+    points_m: Array
+    sigma_m: Array
+
+
+def read_contour(path: Path) -> ContourRows:
+    """Read ``contour.csv``.
 
     Raises:
-        SessionError: the file is missing or not two columns of numbers.
+        SessionError: the file is missing or not in the format of :func:`contour_text`.
     """
+    rows = _read_csv(path, CONTOUR_COLUMNS, CONTOUR_COLUMNS[:2])
     try:
-        return np.array([[float(x), float(y)] for x, y in _read_csv(path, ("x_m", "y_m"))]).reshape(-1, 2)
+        table = np.array([[float(entry) for entry in row] for row in rows[:-1]])
     except ValueError as error:
-        raise SessionError(f"does not have two numbers per line ({error})", where=str(path), hint=RERUN) from error
+        raise SessionError(f"has an entry that is not a number ({error})", where=str(path), hint=RERUN) from error
+    if len(table) < _LEAST_CORNERS or not np.isfinite(table).all():
+        raise SessionError("is not an outline of three finite points or more", where=str(path), hint=RERUN)
+    return ContourRows(table[:, :2], table[:, 2:].ravel())
 
 
-def _read_csv(path: Path, columns: Sequence[str]) -> list[list[str]]:
+def _read_csv(path: Path, *forms: Sequence[str]) -> list[list[str]]:
+    """The lines below the head, which must be one of these."""
     try:
         rows = list(csv.reader(io.StringIO(read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8"))))
     except (OSError, ConfigurationError, UnicodeDecodeError) as error:
         raise SessionError("cannot be read", where=str(path), hint=RERUN) from error
-    if not rows or rows[0] != list(columns) or any(len(row) != len(columns) for row in rows):
-        raise SessionError(f"is not a table of {', '.join(columns)}", where=str(path), hint=RERUN)
+    if not rows or tuple(rows[0]) not in forms or any(len(row) != len(rows[0]) for row in rows):
+        raise SessionError(f"is not a table of {', '.join(forms[0])}", where=str(path), hint=RERUN)
     return rows[1:]

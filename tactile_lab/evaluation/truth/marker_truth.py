@@ -77,6 +77,10 @@ class MarkerTruth:
         sighting = self.sighting(datagram)
         return None if sighting is None else sighting.world_T_object
 
+    def camera_T_world(self) -> Pose3 | None:
+        """The world in the camera's frame, by the mean of the world marker; None if it was not seen."""
+        return self._tracker.world.camera_T_world()
+
     def sighting(self, datagram: Datagram) -> ObjectSighting | None:
         """The object in one frame, with its uncertainty."""
         try:

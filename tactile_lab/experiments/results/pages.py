@@ -6,8 +6,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from textwrap import fill
+from typing import TypeAlias
 
-from tactile_lab.experiments.plot_data import CURVES_KEY, RANGES_KEY, CurvePanel, Plot, RangePanel
+from tactile_lab.experiments.plot_data import CURVES_KEY, RANGES_KEY, CurvePanel, DrawingPanel, Plot, RangePanel
 from tactile_lab.experiments.plot_sheet import EARLIER
 from tactile_lab.experiments.results.stored_result import Part, StoredResult, Table
 from tactile_lab.experiments.summary import markdown
@@ -61,6 +62,9 @@ def _notes(notes: str, newest: Part) -> str:
     return f"*Written about the results of {found['version']}:*\n\n{text}"
 
 
+Lines: TypeAlias = CurvePanel | RangePanel
+
+
 def merge_plots(parts: Sequence[Part]) -> Plot | None:
     """The newest part's plot, plus lines that only earlier parts have, marked by an asterisk."""
     shown: Plot | None = None
@@ -70,18 +74,19 @@ def merge_plots(parts: Sequence[Part]) -> Plot | None:
 
 
 def _with_earlier(newer: Plot, older: Plot) -> Plot:
-    if type(newer.panels[0]) is not type(older.panels[0]):
+    if type(newer.panels[0]) is not type(older.panels[0]) or isinstance(newer.panels[0], DrawingPanel):
         return newer
-    panels = {panel.title: panel for panel in newer.panels}
+    panels: dict[str, Lines] = {panel.title: panel for panel in newer.panels if not isinstance(panel, DrawingPanel)}
     for panel in older.panels:
-        panels[panel.title] = _with_lines(panels.get(panel.title), panel)
+        if not isinstance(panel, DrawingPanel):
+            panels[panel.title] = _with_lines(panels.get(panel.title), panel)
     if not any(line.name.endswith(EARLIER) for panel in panels.values() for line in panel.lines):
         return newer
     usual = CURVES_KEY if isinstance(newer.panels[0], CurvePanel) else RANGES_KEY
     return replace(newer, panels=tuple(panels.values()), key=f"{newer.key or usual}; *: by an earlier version")
 
 
-def _with_lines(newer: CurvePanel | RangePanel | None, older: CurvePanel | RangePanel) -> CurvePanel | RangePanel:
+def _with_lines(newer: Lines | None, older: Lines) -> Lines:
     known = newer.lines if newer else ()
     names = {line.name.removesuffix(EARLIER) for line in known}
     missing = [line for line in older.lines if line.name.removesuffix(EARLIER) not in names]

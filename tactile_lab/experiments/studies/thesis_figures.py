@@ -16,6 +16,7 @@ from tactile_lab.experiments.studies.columns import (
 from tactile_lab.experiments.studies.planar import PLANAR_GRASPS
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, condition, curves, ranges
 from tactile_lab.experiments.summary import Column
+from tactile_lab.experiments.thesis.readings import READINGS, track_as_read
 
 THREE_SHAPES = ("rectangle", "ellipse", "hexagon")
 """The thesis does not name its three planar objects; these stand for them."""
@@ -94,6 +95,28 @@ FIGURE_3_15 = Experiment(
     tracking_runs.correct_by_loops,
     (HAUSDORFF, REGISTRATION, MEAN_DISTANCE, Column("constraints there were", "loops", 0, kind="spread")),
     curves("constraints", "constraints", "grasps", "shape", columns=1),
+    pooled=("shape",),
+    grasps=PLANAR_GRASPS,
+)
+
+THESIS_READINGS = Experiment(
+    "thesis-readings",
+    "The thesis's filter in every reading of its gate, its likelihood and its noise that the text allows.",
+    lambda grasps: [
+        setting
+        for part, readings in READINGS.items()
+        for setting in grid(
+            part=[part], reading=list(readings), noise=[0, 25, 50, 100], shape=THREE_SHAPES, grasps=[grasps]
+        )
+    ],
+    track_as_read,
+    (
+        HAUSDORFF,
+        Column("below 9 mm", "below_9_mm", 0, kind="percent"),
+        REGISTRATION,
+        Column("grasps not placed", "untracked", 0, kind="spread"),
+    ),
+    curves("noise", "motion noise, %", "part", "reading"),
     pooled=("shape",),
     grasps=PLANAR_GRASPS,
 )

@@ -45,8 +45,8 @@ PLANAR_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph", "particle"
 GRAPH_METHODS: tuple[Method, ...] = ("particle", "thesis-pf-graph")
 """Methods whose poses the pose graph corrects."""
 
-THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="squared_exponential", prior_mean="zero")
-"""The thesis's shape model (section 2.2)."""
+THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="thin_plate", prior_mean="zero")
+"""The shape model of section 2.2, with that one of its two kernels that suits its filter better (decision 50)."""
 
 
 class Tracker(Protocol):
@@ -99,6 +99,8 @@ class TrackingSettings(StrictModel):
         particles: their number.
         shape: the shape model; None for the method's own.
         gate: of the thesis's measurement model.
+        matching: the field in the thesis's likelihood (3.9): of all grasps ("map"), or of the previous one alone, as
+            figure 3.4 draws it.
         likelihood: of the calibrated one.
         joint: parameters of the hypotheses.
         icp: parameters of the registration baseline.
@@ -113,6 +115,7 @@ class TrackingSettings(StrictModel):
     particles: int = Limit(default=20_000, ge=100)
     shape: GpisSettings | None = None
     gate: GateSettings = GateSettings()
+    matching: Literal["map", "previous"] = "map"
     likelihood: CalibratedSettings = CalibratedSettings()
     joint: JointSettings = JointSettings()
     icp: IcpSettings = IcpSettings()
@@ -190,7 +193,8 @@ def _particle_tracker(settings: TrackingSettings, start: ContactMap, rng: np.ran
     spacing_m = settings.contour_grid_m if settings.dimension == 2 else settings.surface_grid_m
 
     def field_of(contact_map: ContactMap) -> FieldGrid:
-        fitted = contact_map.fit()
+        alone = settings.matching == "previous" and not calibrated
+        fitted = (contact_map.last_used_alone() if alone else contact_map).fit()
         return FieldGrid.around(
             fitted, margin_m=GRID_MARGIN_m, spacing_m=spacing_m, gradient=calibrated, variance=calibrated
         )

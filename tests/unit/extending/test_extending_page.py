@@ -77,8 +77,8 @@ def test_a_session_with_a_policy_a_figure_a_shape_model_and_a_command(written: W
     out = tmp_path / "round"
     made = tactile_lab("--extension", circle, "reconstruct", session.folder, "--shape", "circle", "--out", out)
     assert made.exit_code == 0, made.stderr
-    outline_m = read_contour(out / "contour.csv")
-    distances_m = np.linalg.norm(outline_m - outline_m[:-1].mean(axis=0), axis=1)
+    outline_m = read_contour(out / "contour.csv").points_m
+    distances_m = np.linalg.norm(outline_m - outline_m.mean(axis=0), axis=1)
     assert np.ptp(distances_m) < 1e-6
     assert 0.03 < distances_m[0] < 0.06  # of a block of 100 x 60 mm
 

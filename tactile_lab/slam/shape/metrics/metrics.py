@@ -22,7 +22,6 @@ from tactile_lab.slam.shape.surfaces.sampling import (
 
 CONTOUR_STEP_m = 0.0005
 MESH_SAMPLES = 50_000
-FSCORE_DISTANCE_m = 0.005
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class ShapeErrors:
         truth_to_estimated_m: (C.3): distance of the truth from the estimate.
         mean_distance_m: average of the two directed mean distances.
         chamfer_m: sum of the two directed mean distances.
-        fscore_5mm: harmonic mean of the shares of each surface within 5 mm of the other, 0 to 1.
+        fscore_1mm, fscore_2mm: harmonic mean of the shares of each surface within 1 or 2 mm of the other, 0 to 1.
         iou: overlap of the enclosed areas or volumes, intersection over union, 0 to 1.
     """
 
@@ -44,7 +43,8 @@ class ShapeErrors:
     truth_to_estimated_m: float
     mean_distance_m: float
     chamfer_m: float
-    fscore_5mm: float
+    fscore_1mm: float
+    fscore_2mm: float
     iou: float
 
 
@@ -120,16 +120,21 @@ def _mesh_distances(source: TriangleMesh, target: TriangleMesh) -> _Directed:
 
 def _errors(outward: _Directed, inward: _Directed, iou: float) -> ShapeErrors:
     means = float(outward.distances_m.mean()), float(inward.distances_m.mean())
-    precision, recall = (float(np.mean(side.distances_m < FSCORE_DISTANCE_m)) for side in (outward, inward))
     return ShapeErrors(
         hausdorff_m=max(outward.largest_m, inward.largest_m),
         estimated_to_truth_m=outward.largest_m,
         truth_to_estimated_m=inward.largest_m,
         mean_distance_m=sum(means) / 2,
         chamfer_m=sum(means),
-        fscore_5mm=2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0,
+        fscore_1mm=_fscore(outward, inward, 0.001),
+        fscore_2mm=_fscore(outward, inward, 0.002),
         iou=iou,
     )
+
+
+def _fscore(outward: _Directed, inward: _Directed, limit_m: float) -> float:
+    precision, recall = (float(np.mean(side.distances_m < limit_m)) for side in (outward, inward))
+    return 2 * precision * recall / (precision + recall) if precision + recall > 0 else 0.0
 
 
 def _check_polygon(points_m: Array, name: str) -> None:

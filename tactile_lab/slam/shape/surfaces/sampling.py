@@ -37,6 +37,15 @@ def sample_polygon(polygon_m: Array, step_m: float) -> Array:
     return np.column_stack([np.interp(places, along, closed[:, axis]) for axis in (0, 1)])
 
 
+def sample_polygon_with_values(polygon_m: Array, values: Array, step_m: float) -> tuple[Array, Array]:
+    """As :func:`sample_polygon`, and values given at the corners, shape (n,), interpolated there."""
+    closed, given = np.vstack([polygon_m, polygon_m[:1]]), np.append(values, values[0])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(closed, axis=0), axis=1))])
+    points = sample_polygon(polygon_m, step_m)
+    places = np.linspace(0.0, along[-1], len(points) + 1)[:-1]
+    return points, np.interp(places, along, given)
+
+
 def sample_mesh(mesh: TriangleMesh, count: int, seed: int = 0) -> Array:
     """Points spread over the surface of a mesh in proportion to area, shape (count, 3); the same for the same seed."""
     return sample_mesh_with_normals(mesh, count, seed)[0]
@@ -44,19 +53,34 @@ def sample_mesh(mesh: TriangleMesh, count: int, seed: int = 0) -> Array:
 
 def sample_mesh_with_normals(mesh: TriangleMesh, count: int, seed: int = 0) -> tuple[Array, Array]:
     """As :func:`sample_mesh`, and the unit normals of the faces there."""
-    rng = np.random.default_rng(seed)
     corners = np.asarray(mesh.vertices, dtype=float)[np.asarray(mesh.faces)]
-    origins, first_edges, second_edges = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    first_edges, second_edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normals = np.cross(first_edges, second_edges)
     doubled_areas = np.linalg.norm(normals, axis=1)
-    shares = np.cumsum(doubled_areas)
+    face, first, second = _places_on_faces(doubled_areas, count, seed)
+    points = corners[face, 0] + first * first_edges[face] + second * second_edges[face]
+    return points, normals[face] / doubled_areas[face, None]
+
+
+def sample_mesh_with_values(mesh: TriangleMesh, values: Array, count: int, seed: int = 0) -> tuple[Array, Array]:
+    """As :func:`sample_mesh`, and values given at the vertices, shape (n,), interpolated there, shape (count,)."""
+    vertices, faces = mesh_arrays(mesh)
+    corners, given = vertices[faces], np.asarray(values, dtype=float)[faces]
+    first_edges, second_edges = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    face, first, second = _places_on_faces(np.linalg.norm(np.cross(first_edges, second_edges), axis=1), count, seed)
+    points = corners[face, 0] + first * first_edges[face] + second * second_edges[face]
+    shares = np.hstack([1 - first - second, first, second])
+    return points, np.asarray(np.sum(shares * given[face], axis=1))
+
+
+def _places_on_faces(areas: Array, count: int, seed: int) -> tuple[Any, Array, Array]:
+    """Faces, and steps along their two edges as shares of shape (count, 1), evenly spread in proportion to area."""
+    rng, shares = np.random.default_rng(seed), np.cumsum(areas)
     stratified = (np.arange(count) + rng.random(count)) / count * shares[-1]
     face = np.minimum(np.searchsorted(shares, stratified, side="right"), len(shares) - 1)
     first, second = rng.random((2, count, 1))
     folded = first + second > 1
-    first, second = np.where(folded, 1 - first, first), np.where(folded, 1 - second, second)
-    points = origins[face] + first * first_edges[face] + second * second_edges[face]
-    return points, normals[face] / doubled_areas[face, None]
+    return face, np.where(folded, 1 - first, first), np.where(folded, 1 - second, second)
 
 
 def distances_to_polygon(points_m: Array, polygon_m: Array) -> Array:

@@ -177,6 +177,15 @@ class ContactMap:
         """The map of all other grasps."""
         return replace(self, placed=self.placed[:index] + self.placed[index + 1 :])
 
+    @property
+    def last_used(self) -> int:
+        """Index of the last grasp whose contacts are part of the shape."""
+        return max(index for index, grasp in enumerate(self.placed) if grasp.used)
+
+    def last_used_alone(self) -> ContactMap:
+        """The map of that grasp alone, at its pose."""
+        return replace(self, placed=(self.placed[self.last_used],))
+
     def without_contact(self, grasp: int, contact: int) -> ContactMap:
         """The map with one contact left out."""
         emptier = replace(self.placed[grasp], left_out=self.placed[grasp].left_out | {contact})

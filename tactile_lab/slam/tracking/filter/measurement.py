@@ -41,10 +41,12 @@ class Known:
     Attributes:
         field: the modelled surface, object frame.
         previous: contacts of the grasp before, object frame.
+        earlier: contacts of all grasps so far that are part of the shape, object frame; None: those of ``previous``.
     """
 
     field: Field
     previous: ContactSet
+    earlier: ContactSet | None = None
 
 
 class Measurement(Protocol):
@@ -55,20 +57,21 @@ class Measurement(Protocol):
 
 
 class GateSettings(StrictModel):
-    """The gate of section 3.5.1; the thesis gives the number of contacts, the other values are this program's.
+    """The gate of section 3.5.1 in the reading under which the thesis's filter does best (experiment
+    ``thesis-readings``, decision 50); the thesis gives the number of contacts, the other values are this program's.
 
     Attributes:
         least_contacts: number of contacts that must be close to the reference.
-        close_to: "previous" compares with the contacts of the previous grasp, as the thesis does;
-            "surface" with the modelled surface.
+        close_to: "previous" compares with the contacts of the previous grasp, "earlier" with those of all grasps
+            before, "surface" with the modelled surface. The text allows all three.
         distance_m: largest distance of a close contact.
         normal_angle_rad: largest angle between the normals of close contacts.
         least_eigenvalue: smallest eigenvalue of (3.18) of the close contacts, lengths scaled by 30 mm.
     """
 
     least_contacts: int = Limit(default=4, ge=0)
-    close_to: Literal["previous", "surface"] = "previous"
-    distance_m: float = Limit(default=0.015, gt=0)
+    close_to: Literal["previous", "earlier", "surface"] = "surface"
+    distance_m: float = Limit(default=0.005, gt=0)
     normal_angle_rad: float = Limit(default=float(np.deg2rad(40.0)), gt=0)
     least_eigenvalue: float = Limit(default=0.15, ge=0)
 
@@ -90,14 +93,15 @@ class ThesisMeasurement:
         points, normals = PLANAR.to_object(rows[:, None], contacts.points_m, contacts.normals)
         values = known.field.predict(points.reshape(-1, contacts.dimension)).mean_m.reshape(len(rows), -1)
         matching = -np.abs(values / self.label_distance_m).sum(axis=1)  # the exponent of (3.9)
-        return np.where(self._passes(points, normals, values, known.previous), matching, -np.inf)
+        return np.where(self._passes(points, normals, values, known), matching, -np.inf)
 
-    def _passes(self, points: Array, normals: Array, values: Array, previous: ContactSet) -> NDArray[np.bool_]:
+    def _passes(self, points: Array, normals: Array, values: Array, known: Known) -> NDArray[np.bool_]:
         """Whether there are enough close contacts, and these are observable."""
         if self.gate.close_to == "surface":
             close = np.abs(values) < self.gate.distance_m
         else:
-            close = self._near_previous(points, normals, previous)
+            earlier = known.earlier if self.gate.close_to == "earlier" else None
+            close = self._near(points, normals, earlier or known.previous)
         passes = np.asarray(close.sum(axis=1) >= self.gate.least_contacts)
         chosen = np.flatnonzero(passes)
         if len(chosen):
@@ -105,10 +109,11 @@ class ThesisMeasurement:
             passes[chosen] = eigenvalue >= self.gate.least_eigenvalue
         return passes
 
-    def _near_previous(self, points: Array, normals: Array, previous: ContactSet) -> NDArray[np.bool_]:
+    def _near(self, points: Array, normals: Array, known: ContactSet) -> NDArray[np.bool_]:
+        """Which contacts have a known one close by, with a similar normal."""
         least_cosine = np.cos(self.gate.normal_angle_rad)
         close = np.zeros(points.shape[:2], dtype=bool)
-        for point, normal in zip(previous.points_m, previous.normals, strict=True):
+        for point, normal in zip(known.points_m, known.normals, strict=True):
             squared = np.sum((points - point) ** 2, axis=2)
             close |= (squared < self.gate.distance_m**2) & (normals @ normal > least_cosine)
         return close

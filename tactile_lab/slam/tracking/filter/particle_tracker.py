@@ -61,7 +61,8 @@ class ParticleTracker:
     def weigh(self, contacts: ContactSet) -> bool:
         if len(contacts) == 0:
             return False
-        known = Known(self._field_of(self._map), self._map.contacts_of(self._last_used()))
+        previous = self._map.contacts_of(self._map.last_used)
+        known = Known(self._field_of(self._map), previous, self._map.contacts)
         weighted = self._belief.weight(self._measurement.log_likelihood(self._belief.rows, contacts, known))
         self._belief = weighted or self._belief
         self.effective_count = self._belief.effective_count
@@ -88,6 +89,3 @@ class ParticleTracker:
 
     def finish(self) -> None:
         """Nothing to do: a filter does not revise earlier estimates."""
-
-    def _last_used(self) -> int:
-        return max(index for index, grasp in enumerate(self._map.placed) if grasp.used)

@@ -11,7 +11,7 @@ from drivers.force.force_fingertip import ForceTip, ForceTipSettings, WrenchSamp
 from tactile_lab.rigs.description import load_rig
 
 STILL = np.array([0.01, -0.02, 0.3, 0.0, 0.0, 0.0])
-PRESSED = STILL + [-0.106, 0.894, 0.0, -0.0134, -0.0016, 0.0]
+PRESSED = STILL + np.array([-0.106, 0.894, 0.0, -0.0134, -0.0016, 0.0])
 """On the palm's side of the tip, 1 mm beside its middle."""
 
 
@@ -46,14 +46,16 @@ def test_a_force_fingertip_tells_its_contact_at_any_moment(tip: ForceTip) -> Non
 def test_a_light_touch_is_none(tip: ForceTip) -> None:
     feel(tip, STILL)
     touches = tip.touches(tip.reading()[None], np.eye(3)[None])
-    assert not touches.is_certain[0] and touches.normal_forces_N[0] == 0.0
+    assert not touches.is_certain[0]
+    assert touches.normal_forces_N[0] == 0.0
 
 
 def test_a_saturated_reading_is_void(tip: ForceTip) -> None:
     feel(tip, 1e3 * np.ones(6))
     assert np.isnan(tip.reading()).all()
     touches = tip.touches(tip.reading()[None], np.eye(3)[None])
-    assert touches.is_void[0] and not touches.is_certain[0]
+    assert touches.is_void[0]
+    assert not touches.is_certain[0]
     assert np.isfinite(touches.points_distal_m).all()
 
 

@@ -63,7 +63,9 @@ def logs(draw):
         | st.builds(ObjectTruth, name=st.text(max_size=5), mesh=st.none() | st.just("a.ply"))
         | st.just(ObjectTruth(polygon_m=((0.0, 0.0), (0.1, 0.0), (0.1, 1 / 30))))
     )
-    motion = draw(st.none() | st.builds(MotionSigma, translation_m=sigmas, rotation_rad=sigmas, unheld=st.floats(0.01, 1.0)))
+    motion = draw(
+        st.none() | st.builds(MotionSigma, translation_m=sigmas, rotation_rad=sigmas, unheld=st.floats(0.01, 1.0))
+    )
     return ContactLog(3, draw(sigmas), draw(sigmas), motion, grasps, truth, tuple(draw(poses) for _ in range(count)))
 
 

@@ -16,7 +16,7 @@ def counts(rng: np.random.Generator, pushed: float = 0.0) -> np.ndarray:
 def cycles_until_touched(pushed: float, begins: int, cycles: int = 400) -> int | None:
     rng, watch = np.random.default_rng(0), LinkWatch()
     for cycle in range(cycles):
-        if watch.is_touched(counts(rng, pushed if cycle >= begins else 0.0)):
+        if watch.is_touched(counts(rng, pushed if cycle >= begins else 0.0), cycle):
             return cycle
     return None
 
@@ -25,23 +25,37 @@ def test_noise_alone_is_no_touch() -> None:
     assert cycles_until_touched(0.0, 0) is None
 
 
-def test_a_push_is_told_in_its_second_cycle() -> None:
+def test_a_push_is_told_in_its_second_reading() -> None:
     assert cycles_until_touched(400.0, 200) == 201
 
 
 def test_a_lone_jerk_and_the_jerk_of_starting_are_no_touch() -> None:
     rng, watch = np.random.default_rng(0), LinkWatch()
     pushes = [900.0 if cycle < 20 or cycle == 100 else 0.0 for cycle in range(200)]
-    assert not any(watch.is_touched(counts(rng, push)) for push in pushes)
+    assert not any(watch.is_touched(counts(rng, push), stamp) for stamp, push in enumerate(pushes))
+
+
+def test_a_lone_jerk_that_is_looked_at_twice_is_no_touch() -> None:
+    """A hand whose statuses come more rarely than the session looks at them."""
+    rng, watch = np.random.default_rng(0), LinkWatch()
+    readings = [counts(rng, 900.0 if number == 100 else 0.0) for number in range(200)]
+    assert not any(watch.is_touched(reading, stamp) for stamp, reading in enumerate(readings) for _ in range(2))
+
+
+def test_a_touch_stays_one_until_something_else_is_heard() -> None:
+    rng, watch = np.random.default_rng(0), LinkWatch()
+    told = [watch.is_touched(counts(rng, 900.0 if stamp >= 100 else 0.0), min(stamp, 101)) for stamp in range(110)]
+    assert not any(told[:101])
+    assert all(told[101:])
 
 
 def test_a_new_motion_is_compared_with_itself() -> None:
     rng, watch = np.random.default_rng(0), LinkWatch()
-    assert not any(watch.is_touched(counts(rng)) for _ in range(100))
+    assert not any(watch.is_touched(counts(rng), stamp) for stamp in range(100))
     watch.restart()
-    assert not any(watch.is_touched(counts(rng, 900.0)) for _ in range(100))
+    assert not any(watch.is_touched(counts(rng, 900.0), 100 + stamp) for stamp in range(100))
 
 
 def test_a_hand_without_strain_gauges_tells_nothing() -> None:
     watch = LinkWatch()
-    assert not any(watch.is_touched(None) for _ in range(50))
+    assert not any(watch.is_touched(None, stamp) for stamp in range(50))

@@ -56,7 +56,7 @@ def test_keys_are_those_of_the_design(evaluation: Evaluation) -> None:
     content = evaluation.as_json()
     assert {"schema_version", "method", "seed", "object", "grasps", "contacts", "shape", "pose"} <= set(content)
     assert {"loops", "time", "status", "aligned", "shape_best_fit", "registration_rms_mm", "failed"} <= set(content)
-    figures = {"hausdorff_mm", "mean_distance_mm", "chamfer_mm", "fscore_5mm", "iou"}
+    figures = {"hausdorff_mm", "mean_distance_mm", "chamfer_mm", "fscore_1mm", "fscore_2mm", "iou"}
     assert set(content["shape"]) == set(content["shape_best_fit"]) == figures
     assert {"rmse_mm", "rmse_deg", "final_mm", "final_deg", "per_grasp"} <= set(content["pose"])
     assert set(content["loops"]) == {"tested", "accepted", "wrong"}

@@ -94,6 +94,7 @@ def test_what_was_felt_is_judged_by_what_it_said_of_its_own_error() -> None:
     assert len(found.missed) == 400  # those of the second session were not felt
     assert found.scale == pytest.approx(1.8, abs=0.2)  # 2, but for what is beyond 3 of them
     lengths, turns = found.share_within(2.0)
-    assert lengths == pytest.approx(0.68, abs=0.05) and turns == pytest.approx(0.68, abs=0.07)
+    assert lengths == pytest.approx(0.68, abs=0.05)
+    assert turns == pytest.approx(0.68, abs=0.07)
     assert "odometry_scale by 1." in found.in_words()
     assert FeltSlips().scale is None

@@ -12,17 +12,10 @@ from hypothesis import strategies as st
 
 from drivers.core.errors import SessionError
 from drivers.core.poses import planar, transform_points
+from tactile_lab.evaluation.files.trajectory_file import COLUMNS, Trajectory, read_trajectory, trajectory_text
 from tactile_lab.evaluation.loops import wrong_loops
 from tactile_lab.evaluation.registration import registration_rms_mm
-from tactile_lab.evaluation.trajectory import (
-    COLUMNS,
-    Trajectory,
-    aligned_poses,
-    estimate_T_truth,
-    pose_errors,
-    read_trajectory,
-    trajectory_text,
-)
+from tactile_lab.evaluation.trajectory import aligned_poses, estimate_T_truth, pose_errors
 
 OFFSET = Pose3(Rot3.RzRyRx(0.1, -0.2, 0.7), np.array([0.01, -0.03, 0.02]))
 """An arbitrary object frame of an estimate, seen from the truth's."""
@@ -48,6 +41,20 @@ def test_file_gives_back_the_same_trajectory_with_unplaced_grasps(tmp_path: Path
     assert found.world_T_object[1] is None
     for pose, expected in zip(found.world_T_object, trajectory.world_T_object, strict=True):
         assert pose is expected or np.array_equal(pose.matrix(), expected.matrix())  # type: ignore[union-attr]
+
+
+def test_covariances_are_read_back_and_may_be_missing(tmp_path: Path) -> None:
+    root = np.random.default_rng(1).normal(size=(6, 6))
+    covariances = (1e-6 * root @ root.T, None, None)
+    trajectory = Trajectory((0.5, 1.0, 2.0), (TRUTH[0], TRUTH[1], None), covariances)
+    text = trajectory_text(trajectory)
+    assert {len(line.split(",")) for line in text.splitlines()} == {17 + 21}
+    found = read_trajectory(write(tmp_path / "trajectory.csv", text))
+    assert found.covariances[1:] == (None, None)
+    assert found.covariances[0] == pytest.approx(covariances[0])
+    negative = Trajectory((0.5,), (TRUTH[0],), (-np.eye(6),))
+    with pytest.raises(SessionError, match=r"line 2: .*negative variances"):
+        read_trajectory(write(tmp_path / "negative.csv", trajectory_text(negative)))
 
 
 def test_unplaced_grasp_has_sixteen_empty_entries() -> None:

@@ -22,7 +22,7 @@ from tactile_lab.colours import UNKNOWN, hex_colour, viridis
 from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import evaluate
 from tactile_lab.evaluation.files.result_files import write_results
-from tactile_lab.evaluation.trajectory import Trajectory, trajectory_text
+from tactile_lab.evaluation.files.trajectory_file import Trajectory, trajectory_text
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
 from tactile_lab.report.course import Course, Stop, read_course
 from tactile_lab.report.listings import decisions_card, stops_card

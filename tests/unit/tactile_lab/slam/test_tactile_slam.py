@@ -71,6 +71,19 @@ def test_the_calibrated_filter_tracks_at_the_slip_of_the_rig() -> None:
     assert all(1 < step.effective_count <= 10_000 for step in result.steps)
 
 
+def test_the_thesis_s_filter_follows_an_object_that_hardly_slips() -> None:
+    data = simulate("rectangle", 3, count=8, motion_scale=0.1)
+    result = run(data, method="thesis-pf", motion={"translation_m": 0.001, "rotation_rad": 0.035}, particles=5_000)
+    assert result.status == "ok"
+    assert registration_mm(data, result) < 5.0
+
+
+@pytest.mark.parametrize("matching", ["map", "previous"])
+def test_the_thesis_s_likelihood_may_know_the_previous_grasp_alone(matching: str) -> None:
+    result = run(simulate("ellipse", 3, count=4), method="thesis-pf", matching=matching, particles=1_000)
+    assert len(result.world_T_object) == 4
+
+
 def test_the_thesis_s_filter_runs_and_says_which_grasps_it_could_not_place() -> None:
     result = run(simulate("rectangle", 0, count=6), method="thesis-pf", particles=5_000)
     assert result.method == "thesis-pf"

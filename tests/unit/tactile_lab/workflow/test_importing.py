@@ -76,5 +76,5 @@ def touched_outline_m(results: Path, points_m: Array) -> Array:
     """The estimated outline within 2 mm of the contacts, shape (n, 2), world frame."""
     trajectory = np.genfromtxt(results / "trajectory.csv", delimiter=",", names=True)
     origin_m = [trajectory["world_T_object_03"][-1], trajectory["world_T_object_13"][-1]]
-    outline_m = np.loadtxt(results / "contour.csv", delimiter=",", skiprows=1) + origin_m
+    outline_m = np.loadtxt(results / "contour.csv", delimiter=",", skiprows=1, usecols=(0, 1)) + origin_m
     return outline_m[np.linalg.norm(outline_m[:, None] - points_m[:, :2], axis=2).min(axis=1) < 0.002]

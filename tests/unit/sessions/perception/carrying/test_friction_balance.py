@@ -35,15 +35,19 @@ def test_a_table_holds_it_back_by_no_more_than_the_creep(contacts):
     """A third of what the fingertips could hold, so a third of 3 mm/s, for 2 s; the noise says so."""
     carry = odometry().carry(carried(contacts, object_motion=TURN, palm_motion=TURN))
     millimetres, degrees = error(carry, TURN)
-    assert millimetres < 2.0 and degrees < 3.0 and carry.problems == ()
-    assert millimetres < 3e3 * carry.sigma.translation_m and degrees < 3 * np.degrees(carry.sigma.rotation_rad)
+    assert millimetres < 2.0
+    assert degrees < 3.0
+    assert carry.problems == ()
+    assert millimetres < 3e3 * carry.sigma.translation_m
+    assert degrees < 3 * np.degrees(carry.sigma.rotation_rad)
 
 
 def test_an_object_that_turns_in_the_hand_with_its_fingertips_is_followed():
     held = Pose2(0.02, -0.01, 0.15)
     carry = odometry().carry(carried(BOX, object_motion=held, palm_motion=TURN))
     millimetres, degrees = error(carry, held)
-    assert millimetres < 2.0 and degrees < 2.0
+    assert millimetres < 2.0
+    assert degrees < 2.0
     assert np.degrees(carry.slip_rad) == pytest.approx(np.degrees(0.25), abs=2.0)
 
 
@@ -51,7 +55,8 @@ def test_fingertips_that_slide_along_a_flat_side_leave_the_object_where_its_othe
     """One finger slides 5 mm along its face while four stick."""
     steps = carried(BOX, object_motion=TURN, palm_motion=TURN, extra_moves={"FF": np.array([0.005, 0.0, 0.0])})
     millimetres, degrees = error(odometry().carry(steps), TURN)
-    assert millimetres < 1.0 and degrees < 2.0
+    assert millimetres < 1.0
+    assert degrees < 2.0
 
 
 def test_an_object_that_nobody_touches_stays_and_the_noise_holds_what_the_palm_did():
@@ -60,7 +65,8 @@ def test_an_object_that_nobody_touches_stays_and_the_noise_holds_what_the_palm_d
     assert carry.motion.equals(Pose2(), 1e-9)
     assert carry.loose_s == pytest.approx(steps.step_s.sum())
     assert "touched by no fingertip" in carry.in_words()
-    assert carry.sigma.translation_m > 0.01 and carry.sigma.rotation_rad > 0.15
+    assert carry.sigma.translation_m > 0.01
+    assert carry.sigma.rotation_rad > 0.15
 
 
 def test_an_object_that_slips_out_halfway_stays_where_it_was_lost():
@@ -69,21 +75,24 @@ def test_an_object_that_slips_out_halfway_stays_where_it_was_lost():
     carry = odometry().carry(steps)
     assert carry.motion.theta() == pytest.approx(TURN.theta() / 2, abs=0.02)
     missed_m, missed_rad = np.linalg.norm([0.01, 0.005]), 0.2
-    assert carry.sigma.translation_m > missed_m / 3 and carry.sigma.rotation_rad > missed_rad / 3
+    assert carry.sigma.translation_m > missed_m / 3
+    assert carry.sigma.rotation_rad > missed_rad / 3
 
 
 def test_one_fingertip_tells_little_and_says_so():
     carry = odometry().carry(carried(BOX, object_motion=TURN, palm_motion=TURN, felt=("TH",)))
     assert "held by one fingertip" in carry.in_words()
     millimetres, degrees = error(carry, TURN)
-    assert 1e3 * carry.sigma.translation_m > millimetres / 3 and np.degrees(carry.sigma.rotation_rad) > degrees / 3
+    assert 1e3 * carry.sigma.translation_m > millimetres / 3
+    assert np.degrees(carry.sigma.rotation_rad) > degrees / 3
 
 
 def test_a_saturated_fingertip_is_named_and_makes_the_carry_less_certain():
     steps = carried(BOX, object_motion=TURN, palm_motion=TURN, felt=("FF", "MF", "RF", "TH"))
     steps.is_void[:, 3] = True
     carry = odometry().carry(steps)
-    assert carry.void == ("LF",) and "LF without valid readings" in carry.in_words()
+    assert carry.void == ("LF",)
+    assert "LF without valid readings" in carry.in_words()
     assert carry.sigma.translation_m > 0.005
 
 
@@ -93,7 +102,8 @@ def test_an_object_that_cannot_be_moved_resists_and_the_noise_holds_that():
     steps = carried(BOX, object_motion=shift, palm_motion=shift)
     steps.net_forces_N[:] = [0.6 * steps.forces_N.sum(axis=1)[0], 0.0]
     carry = odometry().carry(steps)
-    assert "resisted" in carry.in_words() and carry.is_remarkable
+    assert "resisted" in carry.in_words()
+    assert carry.is_remarkable
     assert carry.sigma.translation_m > error(carry, Pose2())[0] / 1e3 / 3
 
 

@@ -55,7 +55,8 @@ def test_what_is_felt_between_capture_and_release_is_one_carry():
     watched.on_hold(10 * CYCLE_ns)
     carry = watched.end_hold()
     assert carry.motion.x() == pytest.approx(0.03, abs=0.004)
-    assert not watched.is_watched and watched.carry is carry
+    assert not watched.is_watched
+    assert watched.carry is carry
 
 
 def test_an_object_that_was_left_is_not_watched():

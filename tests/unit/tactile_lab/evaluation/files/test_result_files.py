@@ -97,15 +97,15 @@ def test_results_read_back(tmp_path: Path, result: SlamResult, recorded: Recorde
 def test_planar_session_ends_with_its_contour_stood_upright(tmp_path: Path, recorded: Recorded) -> None:
     result = result_of(2, seed=0, motion_noise=0.2)
     write_results(tmp_path, result, recorded.grasps)
-    contour = read_contour(tmp_path / "contour.csv")
-    assert np.array_equal(contour[0], contour[-1])
+    contour = read_contour(tmp_path / "contour.csv").points_m
+    assert signed_area_m2(contour) > 0  # counter-clockwise
     mesh = trimesh.load_mesh(tmp_path / "mesh.ply", process=False)
     assert mesh.is_watertight
     origin_height = result.world_T_object[0].z()  # type: ignore[union-attr]
     highest = max(float(grasp.points_world_m[:, 2].max()) for grasp in recorded.grasps)
     assert mesh.bounds[:, 2] == pytest.approx([-origin_height, highest - origin_height], abs=1e-6)
-    assert mesh.volume == pytest.approx(signed_area_m2(contour[:-1]) * highest, rel=1e-4)
-    assert signed_area_m2(contour[:-1]) == pytest.approx(SIZE_m[0] * SIZE_m[1], rel=0.25)
+    assert mesh.volume == pytest.approx(signed_area_m2(contour) * highest, rel=1e-4)
+    assert signed_area_m2(contour) == pytest.approx(SIZE_m[0] * SIZE_m[1], rel=0.25)
 
 
 def test_steps_are_told_without_durations(tmp_path: Path, recorded: Recorded) -> None:
@@ -159,15 +159,33 @@ def test_contacts_of_a_grasp_beyond_the_trajectory_are_refused(tmp_path: Path, r
 
 
 def test_contour_file_refuses_words(tmp_path: Path) -> None:
-    (tmp_path / "contour.csv").write_text("x_m,y_m\n1.0,one\n")
-    with pytest.raises(SessionError, match="two numbers"):
+    (tmp_path / "contour.csv").write_text("x_m,y_m\n1.0,one\n1.0,2.0\n")
+    with pytest.raises(SessionError, match="not a number"):
         read_contour(tmp_path / "contour.csv")
 
 
-def test_contour_is_written_counter_clockwise_and_closed() -> None:
-    forward, backward = contour_text(ELL), contour_text(np.vstack([ELL[::-1], ELL[-1:]]))
-    assert sorted(forward.splitlines()) != forward.splitlines()
-    assert len(forward.splitlines()) == len(backward.splitlines()) == len(ELL) + 2
+def test_contour_file_refuses_a_line_and_infinite_points(tmp_path: Path) -> None:
+    for rows in (["0,0,0.1", "1,0,0.1", "0,0,0.1"], ["0,0,0", "1,0,0", "inf,1,0", "0,0,0"]):
+        (tmp_path / "contour.csv").write_text("\n".join(["x_m,y_m,sigma_m", *rows]))
+        with pytest.raises(SessionError, match="three finite points"):
+            read_contour(tmp_path / "contour.csv")
+
+
+def test_contour_files_of_older_versions_have_no_standard_deviations(tmp_path: Path) -> None:
+    (tmp_path / "contour.csv").write_text("x_m,y_m\n0,0\n1,0\n0,1\n0,0\n")
+    found = read_contour(tmp_path / "contour.csv")
+    assert found.points_m.tolist() == [[0, 0], [1, 0], [0, 1]]
+    assert found.sigma_m.shape == (0,)
+
+
+def test_contour_is_closed_and_reads_back(tmp_path: Path) -> None:
+    sigma_m = 1e-4 * np.arange(1.0, len(ELL) + 1)
+    (tmp_path / "contour.csv").write_text(contour_text(ELL, sigma_m))
+    lines = (tmp_path / "contour.csv").read_text().splitlines()
+    assert (len(lines), lines[1]) == (len(ELL) + 2, lines[-1])
+    found = read_contour(tmp_path / "contour.csv")
+    assert np.array_equal(found.points_m, ELL)
+    assert np.array_equal(found.sigma_m, sigma_m)
 
 
 def test_ring_without_area_is_a_shape_error() -> None:

@@ -38,7 +38,7 @@ def test_equal_outlines_have_no_error() -> None:
     errors = contour_errors(l_block(), l_block()[::-1])
     assert errors.hausdorff_m == pytest.approx(0, abs=1e-12)
     assert errors.chamfer_m == pytest.approx(0, abs=1e-12)
-    assert errors.fscore_5mm == 1.0
+    assert errors.fscore_1mm == 1.0
     assert errors.iou == pytest.approx(1.0)
 
 
@@ -49,7 +49,7 @@ def test_hausdorff_of_nested_squares_is_the_distance_of_their_corners() -> None:
     assert errors.truth_to_estimated_m == pytest.approx(0.01 * np.sqrt(2))
     assert errors.hausdorff_m == errors.truth_to_estimated_m
     assert errors.iou == pytest.approx(0.25)
-    assert errors.fscore_5mm == 0.0
+    assert errors.fscore_1mm == 0.0
 
 
 def test_spike_is_seen_from_the_estimate_only() -> None:
@@ -57,7 +57,7 @@ def test_spike_is_seen_from_the_estimate_only() -> None:
     errors = contour_errors(spiked, SQUARE)
     assert errors.hausdorff_m == errors.estimated_to_truth_m == pytest.approx(0.03)
     assert errors.truth_to_estimated_m < 1e-3
-    assert 0.5 < errors.fscore_5mm < 1
+    assert 0.5 < errors.fscore_1mm < 1
 
 
 def test_mean_distances_of_concentric_circles_are_their_gap() -> None:
@@ -116,7 +116,7 @@ def test_equal_meshes_have_no_error() -> None:
     sphere = trimesh.creation.icosphere(3, 0.04)
     errors = mesh_errors(sphere, sphere)
     assert errors.hausdorff_m == pytest.approx(0, abs=1e-9)
-    assert (errors.fscore_5mm, errors.iou) == (1.0, 1.0)
+    assert (errors.fscore_1mm, errors.iou) == (1.0, 1.0)
 
 
 def test_shifted_boxes_overlap_by_their_shift() -> None:

@@ -49,6 +49,7 @@ CORNERS = ContactSet(
     np.full(5, 0.1),
 )
 NOWHERE = np.array([0.5, 0.5, 0.0])
+PREVIOUS = GateSettings(close_to="previous", distance_m=0.015)
 
 
 def test_equation_3_9_is_minus_the_sum_of_field_values() -> None:
@@ -61,7 +62,7 @@ def test_equation_3_9_is_minus_the_sum_of_field_values() -> None:
 
 
 def test_the_gate_needs_four_contacts_near_the_previous_ones() -> None:
-    model = ThesisMeasurement(GateSettings(), label_distance_m=0.005)
+    model = ThesisMeasurement(PREVIOUS, label_distance_m=0.005)
     near, far = np.zeros(3), np.array([0.05, 0.0, 0.0])
     found = model.log_likelihood(np.array([near, far]), CORNERS, Known(Disc(), CORNERS))
     assert np.isfinite(found[0])
@@ -71,20 +72,30 @@ def test_the_gate_needs_four_contacts_near_the_previous_ones() -> None:
 def test_a_gate_that_asks_for_no_contact_may_find_none() -> None:
     far = np.array([[0.5, 0.0, 0.0]])
     for least_eigenvalue, passes in ((0.0, True), (0.15, False)):
-        gate = GateSettings(least_contacts=0, least_eigenvalue=least_eigenvalue)
+        gate = PREVIOUS.model_copy(update={"least_contacts": 0, "least_eigenvalue": least_eigenvalue})
         found = ThesisMeasurement(gate, 0.005).log_likelihood(far, CORNERS, Known(Disc(), CORNERS))
         assert np.isfinite(found[0]) == passes
 
 
 def test_the_gate_compares_normals_too() -> None:
-    model = ThesisMeasurement(GateSettings(), label_distance_m=0.005)
+    model = ThesisMeasurement(PREVIOUS, label_distance_m=0.005)
     inward = ContactSet(CORNERS.points_m, -CORNERS.normals, CORNERS.point_sigma_m, CORNERS.normal_sigma_rad)
     assert model.log_likelihood(np.zeros((1, 3)), CORNERS, Known(Disc(), inward))[0] == -np.inf
 
 
 def test_the_gate_refuses_close_contacts_that_are_not_observable() -> None:
-    model = ThesisMeasurement(GateSettings(), label_distance_m=0.005)
+    model = ThesisMeasurement(PREVIOUS, label_distance_m=0.005)
     assert model.log_likelihood(np.zeros((1, 3)), AROUND, Known(Disc(), AROUND))[0] == -np.inf
+
+
+def test_the_gate_may_ask_for_contacts_of_any_grasp_before() -> None:
+    elsewhere = ContactSet(CORNERS.points_m + 0.5, CORNERS.normals, CORNERS.point_sigma_m, CORNERS.normal_sigma_rad)
+    both = ContactSet.concatenate([CORNERS, elsewhere])
+    known = Known(Disc(), elsewhere, both)
+    for close_to, passes in (("previous", False), ("earlier", True)):
+        gate = PREVIOUS.model_copy(update={"close_to": close_to})
+        found = ThesisMeasurement(gate, 0.005).log_likelihood(np.zeros((1, 3)), CORNERS, known)
+        assert np.isfinite(found[0]) == passes
 
 
 def test_the_gate_may_ask_the_surface_instead_of_the_previous_grasp() -> None:

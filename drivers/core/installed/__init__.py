@@ -1,0 +1,1 @@
+"""What is installed beside the program: packages of extras, and plug-ins."""

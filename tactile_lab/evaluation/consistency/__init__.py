@@ -1,0 +1,1 @@
+"""Whether stated uncertainties are true, judged by the truth."""

@@ -1,0 +1,106 @@
+"""Whether the covariances of a trajectory are true, by the normalised squared error of its poses (NEES).
+
+It follows chi square with as many degrees of freedom as a pose has estimated components. An estimate is compared with
+the truth in one object frame: where it was born, at the first grasp (:func:`birth_frame`), or the one that agrees best
+with all grasps (:func:`common_frame`), which does not count an error of the first grasp against all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from gtsam import Pose3, Rot3
+from scipy.stats import chi2
+
+from drivers.core.contacts import Array
+from drivers.core.rotations import exponential, logarithm
+from tactile_lab.evaluation.consistency.levels import LEVELS
+from tactile_lab.evaluation.consistency.pose_covariance import pose_deviation
+from tactile_lab.evaluation.trajectory import Compared, Poses, compared_grasps
+
+_LEAST_VARIANCE = 1e-9
+"""A component with a smaller variance is given, not estimated: the birth pose, or the height of what is on a table."""
+_MEAN_STEPS = 10
+
+
+@dataclass(frozen=True)
+class PoseConsistency:
+    """Stated pose uncertainties against the truth.
+
+    Attributes:
+        nees: normalised squared error of each judged pose, divided by its number of components: 1 on average if the
+            covariances are true, above 1 if they are too small.
+        components: estimated components of a pose: 3 on a table, 6 in space.
+        inside: share of the poses whose truth lies inside the stated region, for each of
+            :data:`~tactile_lab.evaluation.consistency.levels.LEVELS`.
+        log_score: mean log density of the true pose, metres and radians; higher is better.
+    """
+
+    nees: tuple[float, ...]
+    components: int
+    inside: tuple[float, ...]
+    log_score: float
+
+
+def pose_consistency(
+    estimate: Poses, covariances: Sequence[Array | None], truth: Poses, estimate_T_truth: Pose3 | None
+) -> PoseConsistency | None:
+    """Judge the covariances of a trajectory, relative to an object frame in which estimate and truth are compared.
+
+    Args:
+        estimate: estimated ``world_T_object`` of each grasp.
+        covariances: of each, shape (6, 6), see :class:`tactile_lab.evaluation.files.trajectory_file.Trajectory`.
+        truth: true poses, in the truth's object frame.
+        estimate_T_truth: the truth's object frame in the estimate's: :func:`birth_frame` or :func:`common_frame`.
+
+    Returns:
+        None without such a frame, or if no grasp has a covariance and both poses.
+    """
+    if estimate_T_truth is None or not covariances:
+        return None
+    judged = [
+        scored
+        for pair in compared_grasps(estimate, truth)
+        if (scored := _score(pair, covariances[pair.index], estimate_T_truth)) is not None
+    ]
+    if not judged:
+        return None
+    nees, sizes, densities = (np.array(column) for column in zip(*judged, strict=True))
+    inside = tuple(float(np.mean(nees <= chi2.ppf(level, sizes))) for level in LEVELS)
+    return PoseConsistency(tuple((nees / sizes).tolist()), int(sizes.max()), inside, float(densities.mean()))
+
+
+def _score(pair: Compared, covariance: Array | None, estimate_T_truth: Pose3) -> tuple[float, int, float] | None:
+    """Squared normalised error, its number of components, and log density; None for a pose that was given."""
+    if covariance is None:
+        return None
+    known = np.flatnonzero(np.diag(covariance) > _LEAST_VARIANCE)
+    if not len(known):
+        return None
+    error = pose_deviation(pair.estimate, pair.truth * estimate_T_truth.inverse())[known]
+    stated = covariance[np.ix_(known, known)]
+    sign, log_determinant = np.linalg.slogdet(stated)
+    if sign <= 0:
+        return None
+    squared = float(error @ np.linalg.solve(stated, error))
+    return squared, len(known), -0.5 * (squared + float(log_determinant) + len(known) * float(np.log(2 * np.pi)))
+
+
+def birth_frame(estimate: Poses, truth: Poses) -> Pose3 | None:
+    """The truth's object frame in the estimate's by the grasp that defined the latter; None if its truth is unknown."""
+    both, born = compared_grasps(estimate, truth), next((i for i, pose in enumerate(estimate) if pose is not None), -1)
+    return both[0].estimate.between(both[0].truth) if both and both[0].index == born else None
+
+
+def common_frame(estimate: Poses, truth: Poses) -> Pose3 | None:
+    """The truth's object frame in the estimate's that agrees best with all grasps (their mean); or None."""
+    found = [pair.estimate.between(pair.truth) for pair in compared_grasps(estimate, truth)]
+    if len(found) < 2:
+        return None
+    rotations = np.array([pose.rotation().matrix() for pose in found])
+    mean = rotations[0]
+    for _ in range(_MEAN_STEPS):
+        mean = mean @ exponential(logarithm(mean.T @ rotations).mean(axis=0))
+    return Pose3(Rot3(mean), np.mean([pose.translation() for pose in found], axis=0))

@@ -1,0 +1,1 @@
+"""What the thesis's text leaves open, and its figures made again."""

@@ -1,0 +1,111 @@
+"""The marker camera's last picture of a grasp with the estimate drawn into it, where the camera would see it."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from gtsam import Pose3
+
+from drivers.camera.calibration import CameraCalibration, load_camera
+from drivers.camera.frames import Image
+from drivers.camera.markers import MarkerSettings
+from drivers.camera.packet import decode_packet
+from drivers.camera.world_marker import table_glass
+from drivers.core.configuration import validate
+from drivers.core.contacts import Array
+from drivers.core.errors import TactileLabError
+from drivers.core.poses import transform_points
+from sessions.recording.session import TRAFFIC, Session
+from tactile_lab.evaluation.trajectory import Poses
+from tactile_lab.evaluation.truth.marker_truth import MarkerTruth
+from tactile_lab.evaluation.truth.session_truth import camera_datagrams, marked_pictures
+from tactile_lab.report.svg import Chart, Frame
+from tactile_lab.rigs.description import OTHER_VERSION
+
+_CAMERA = "camera"
+_LARGEST_px, _QUALITY = 960, 82
+_NEAREST_m = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class CameraView:
+    """A picture, and where the camera was.
+
+    Attributes:
+        grasp: number of the grasp that it shows, from 0.
+        image: shape (height, width), grey.
+        lens, markers: the session's calibration.
+        camera_T_world: by the world marker.
+    """
+
+    grasp: int
+    image: Image
+    lens: CameraCalibration
+    markers: MarkerSettings
+    camera_T_world: Pose3
+
+    def pixels(self, points_world_m: Array) -> Array | None:
+        """Where the camera sees points of shape (n, 3) through the table's glass, shape (n, 2); None behind it."""
+        eye = np.array(self.camera_T_world.inverse().translation())
+        apparent = table_glass(self.markers).apparent(points_world_m, eye)
+        seen = transform_points(self.camera_T_world, apparent)
+        return None if not len(seen) or seen[:, 2].min() < _NEAREST_m else self.lens.project(seen)
+
+
+def last_view(session: Session, world_T_object: Poses) -> tuple[CameraView | None, str]:
+    """The last picture of a grasp whose pose was estimated; None without one, and why, "" for a session without camera.
+
+    Args:
+        session: with its recording.
+        world_T_object: estimated pose of each grasp.
+    """
+    if _CAMERA not in session.manifest.calibration or not (session.folder / TRAFFIC).is_file():
+        return None, ""
+    try:
+        return _last_view(session, world_T_object)
+    except TactileLabError as error:  # the report is about the session; a picture that cannot be read is one line in it
+        return None, str(error)
+
+
+def _last_view(session: Session, world_T_object: Poses) -> tuple[CameraView | None, str]:
+    where = f"{session.folder}/session.yaml"
+    markers = validate(session.manifest.settings.get("markers", {}), MarkerSettings, where=where, hint=OTHER_VERSION)
+    lens = load_camera(session.calibration_file(_CAMERA))
+    camera_T_world = MarkerTruth(lens, markers, camera_datagrams(session.traffic().messages())).camera_T_world()
+    if camera_T_world is None:
+        return None, "the camera did not see the world marker"
+    pictures = marked_pictures(session.traffic().messages())
+    for grasp in sorted(pictures, reverse=True):
+        if grasp < len(world_T_object) and world_T_object[grasp] is not None:
+            image = decode_packet(pictures[grasp]).image
+            if image is not None:
+                return CameraView(grasp, image, lens, markers, camera_T_world), ""
+    return None, "no picture of a grasp with an estimated pose was recorded"
+
+
+def draw_on_picture(
+    view: CameraView, outlines: list[tuple[str, Array]], contacts_world_m: Array, description: str
+) -> str:
+    """The picture with closed outlines (style and points in the world, shape (n, 3)) and contacts in it, as SVG."""
+    height, width = view.image.shape
+    chart = Chart(Frame(float(width), float(height), 0, 0, 0, 0), (0.0, float(width)), (float(height), 0.0))
+    chart.add(f'<image href="{_data_uri(view.image)}" width="{width}" height="{height}"/>')
+    scale = width / 460
+    for kind, points in outlines:
+        if (pixels := view.pixels(points)) is not None:
+            for part, width_px in (("casing", 2.6), (kind, 1.3)):  # legible on light and on dark
+                chart.path(pixels, f"seen {part}-seen", closed=True, style=f"stroke-width:{width_px * scale:.2f}")
+    dots = view.pixels(contacts_world_m) if len(contacts_world_m) else None
+    for dot in dots if dots is not None else ():
+        chart.dot(dot, "contact-seen", radius=round(3.2 * scale, 2))
+    return chart.text("The camera's picture", description)
+
+
+def _data_uri(image: Image) -> str:
+    shrink = min(1.0, _LARGEST_px / max(image.shape))
+    small = image if shrink == 1.0 else cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
+    _, encoded = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode("ascii")

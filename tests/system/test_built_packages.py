@@ -1,0 +1,81 @@
+"""The wheel and the sdist: both are built, hold the same program, and it runs from where they were installed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+PACKAGES = ("tactile_lab", "drivers", "calibration", "sessions")
+BUILD = "import sys; from setuptools import build_meta as b; print(getattr(b, sys.argv[1])(sys.argv[2]))"
+
+pytestmark = pytest.mark.long
+
+
+def build(source: Path, kind: str, out: Path) -> Path:
+    """Build as pip would, with the setuptools that is here, so that no network is needed."""
+    words = [sys.executable, "-W", "ignore", "-c", BUILD, kind, str(out)]
+    done = subprocess.run(words, cwd=source, capture_output=True, text=True, check=True)
+    return out / done.stdout.splitlines()[-1]
+
+
+def program_files(wheel: Path) -> set[str]:
+    return {name for name in zipfile.ZipFile(wheel).namelist() if name.split("/")[0] in PACKAGES}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The wheel, and a wheel made from the unpacked sdist."""
+    folder = tmp_path_factory.mktemp("built")
+    for package in PACKAGES:
+        shutil.copytree(REPOSITORY / package, folder / "source" / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(REPOSITORY / name, folder / "source")
+    with tarfile.open(build(folder / "source", "build_sdist", folder)) as archive:
+        archive.extractall(folder / "unpacked", filter="data")
+    (unpacked,) = (folder / "unpacked").iterdir()
+    for name in ("first", "second"):
+        (folder / name).mkdir()
+    return build(folder / "source", "build_wheel", folder / "first"), build(unpacked, "build_wheel", folder / "second")
+
+
+def test_wheel_and_sdist_hold_every_file_of_the_packages(built: tuple[Path, Path]) -> None:
+    sources = {
+        path.relative_to(REPOSITORY).as_posix()
+        for package in PACKAGES
+        for path in (REPOSITORY / package).rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    }
+    for wheel in built:
+        assert program_files(wheel) == sources
+
+
+def test_the_program_runs_from_an_installed_wheel(built: tuple[Path, Path], tmp_path: Path) -> None:
+    installed = tmp_path / "installed"
+    with zipfile.ZipFile(built[1]) as wheel:
+        wheel.extractall(installed)
+    environment = os.environ | {"PYTHONPATH": str(installed)}
+    words = [sys.executable, "-P", "-m", "tactile_lab", "run", "--rig", "sim", "--grasps", "2", "--no-input"]
+    done = subprocess.run(
+        [*words, "--out", str(tmp_path / "runs")],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    (session,) = (tmp_path / "runs").iterdir()
+    assert (session / "results" / "report.html").is_file()
+    where = "import tactile_lab, drivers; print(tactile_lab.__file__, drivers.__file__)"
+    told = subprocess.run(
+        [sys.executable, "-P", "-c", where], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert all(file.startswith(str(installed)) for file in told.stdout.split())

@@ -1,0 +1,90 @@
+"""Coverage of stated pose covariances, on errors drawn from the stated distribution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from gtsam import Pose3, Rot3
+
+from drivers.core.contacts import Array
+from drivers.core.rotations import exponential, logarithm
+from tactile_lab.evaluation.consistency.levels import LEVELS
+from tactile_lab.evaluation.consistency.pose_covariance import covariance_in_world, pose_deviation
+from tactile_lab.evaluation.consistency.poses import birth_frame, common_frame, pose_consistency
+
+OBJECT_FRAME = Pose3(Rot3.Rz(0.7), np.array([0.02, -0.01, 0.0]))
+"""The truth's object frame in the estimate's."""
+STATED = np.diag([4e-6, 1e-6, 1e-4])
+GRASPS = 400
+
+
+def moved(pose: Pose3, error: Array) -> Pose3:
+    """A pose with an error of position and rotation in the world, shape (6,)."""
+    return Pose3(Rot3(exponential(error[3:]) @ pose.rotation().matrix()), pose.translation() + error[:3])
+
+
+def drawn(factor: float) -> tuple[list[Pose3], list[Pose3]]:
+    """Estimates and truths on a table; the first estimate is exact, the others have the stated errors by a factor."""
+    rng = np.random.default_rng(7)
+    errors = factor * rng.multivariate_normal(np.zeros(3), STATED, GRASPS)
+    errors[0] = 0.0
+    born = [Pose3(Rot3.Rz(turn), np.array([x, y, 0.03])) for x, y, turn in rng.normal(size=(GRASPS, 3))]
+    told = [moved(pose, np.array([x, y, 0, 0, 0, turn])) for pose, (x, y, turn) in zip(born, errors, strict=True)]
+    return told, [pose * OBJECT_FRAME for pose in born]
+
+
+@pytest.mark.parametrize("frame", [birth_frame, common_frame])
+def test_true_covariances_hold_the_truth_as_often_as_they_say(frame: object) -> None:
+    told, truth = drawn(1.0)
+    stated = [covariance_in_world(pose, STATED) for pose in told]
+    assert callable(frame)
+    found = pose_consistency(told, stated, truth, frame(told, truth))
+    assert found is not None
+    assert found.components == 3
+    assert found.inside == pytest.approx(LEVELS, abs=0.06)
+    assert np.mean(found.nees) == pytest.approx(1.0, abs=0.1)
+
+
+def test_covariances_that_are_too_small_are_seen_and_score_lower() -> None:
+    told, truth = drawn(1.0)
+    frame = birth_frame(told, truth)
+    honest, bold = (
+        pose_consistency(told, [covariance_in_world(pose, scale * STATED) for pose in told], truth, frame)
+        for scale in (1.0, 0.1)
+    )
+    assert honest is not None
+    assert bold is not None
+    assert bold.inside[2] < 0.5 < honest.inside[2]
+    assert bold.log_score < honest.log_score
+    assert np.mean(bold.nees) == pytest.approx(10 * np.mean(honest.nees))
+
+
+def test_the_given_birth_pose_and_unknown_ones_do_not_count() -> None:
+    told, truth = drawn(1.0)
+    stated = [1e-10 * np.eye(6), None, covariance_in_world(told[2], STATED)]
+    found = pose_consistency(told[:3], stated, truth[:3], birth_frame(told[:3], truth[:3]))
+    assert found is not None
+    assert len(found.nees) == 1
+
+
+def test_without_the_birth_grasps_truth_only_the_common_frame_is_known() -> None:
+    told, truth = drawn(0.0)
+    unseen = [None, *truth[1:5]]
+    assert birth_frame(told[:5], unseen) is None
+    frame = common_frame(told[:5], unseen)
+    assert frame is not None
+    assert frame.equals(OBJECT_FRAME, 1e-9)
+    assert pose_consistency(told[:5], [], unseen, frame) is None
+
+
+def test_a_covariance_in_space_is_that_of_small_rotations_of_the_world() -> None:
+    rng = np.random.default_rng(3)
+    vector = np.array([0.5, -1.1, 2.0])
+    pose = Pose3(Rot3(exponential(vector)), np.array([0.1, 0.2, 0.3]))
+    chart = 1e-8 * np.diag([1.0, 2.0, 3.0, 400.0, 500.0, 600.0])
+    steps = rng.multivariate_normal(np.zeros(6), chart, 4000)
+    shaken = [Pose3(Rot3(exponential(vector + step[3:])), pose.translation() + step[:3]) for step in steps]
+    seen = np.cov(np.array([pose_deviation(one, pose) for one in shaken]).T)
+    expected = covariance_in_world(pose, chart)
+    assert seen == pytest.approx(expected, abs=0.1 * expected.diagonal().max())
+    assert logarithm(pose.rotation().matrix()) == pytest.approx(vector)
