@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: help demo test suite test-long check bench results experiments coverage lock clean mutants
+.PHONY: help demo test suite test-long check bench results experiments coverage docs lock clean mutants
 
 help:  ## This list
 	@echo "make TARGET:"
@@ -55,9 +55,23 @@ coverage: $(READY)  ## All tests, and how much of each package they run through,
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "" --cov --cov-report=json
 	$(BIN)/python -m tests.support.package_coverage coverage.json --store
 
+DOCS := build/docs-venv
+
+docs: $(DOCS)/ready  ## The documentation as a site with search, in build/site; strict: a link that leads nowhere fails
+	NO_MKDOCS_2_WARNING=1 $(DOCS)/bin/mkdocs build --quiet --strict
+	@echo "python3 -m http.server --bind 127.0.0.1 --directory build/site   shows it, search included, without a network"
+
+# The site's generator reads the packages' text only: it has an environment of its own.
+$(DOCS)/ready: docs/requirements.lock
+	$(PYTHON) -m venv --without-pip $(DOCS)
+	$(PYTHON) -m pip --python $(DOCS)/bin/python install --quiet --disable-pip-version-check --require-hashes --no-deps -r docs/requirements.lock
+	touch $@
+
 lock:  ## Resolve the dependencies again, with hashes
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \
 		--no-emit-index-url --no-header --no-annotate --extra dev --override .ci/overrides.txt -o requirements.lock pyproject.toml
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-config \
+		--no-emit-index-url --no-header --no-annotate --group docs -o docs/requirements.lock
 
 clean:  ## Remove the environment, what was built, and caches
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis

@@ -18,7 +18,8 @@ import traceback
 from pathlib import Path
 
 from drivers.core.errors import ConfigurationError, TactileLabError
-from drivers.core.registry import Registry, explain
+from drivers.core.installed.entries import explain
+from drivers.core.registry import Registry
 
 VARIABLE = "TACTILE_LAB_EXTENSIONS"
 """Environment variable: the files, joined as in ``PATH``."""
@@ -61,9 +62,12 @@ def unload_extension(path: Path) -> None:
 
 
 def blamed(error: BaseException) -> str:
-    """The extension that raised an unexpected error, with its message; empty if none did."""
+    """The extension or plug-in that raised an unexpected error, with its message; empty if none did."""
     files = {frame.filename for frame in traceback.extract_tb(error.__traceback__)}
-    return next((f"{file}: this extension failed: {explain(error, file)}" for file in _named() if file in files), "")
+    ours = dict.fromkeys(_named(), "extension") | dict.fromkeys(Registry.plugin_files(), "plug-in")
+    return next(
+        (f"{file}: this {what} failed: {explain(error, file)}" for file, what in ours.items() if file in files), ""
+    )
 
 
 def _import(path: Path, name: str) -> None:

@@ -2,23 +2,24 @@
 
 A registry maps names to entries of one kind (policies, shape models, fingertip kinds ...). The program fills it with
 its own, and an extension (:mod:`drivers.core.extensions`) adds to it with the same call, so that nothing distinguishes
-the two. Each entry remembers the file that registered it, for messages.
+the two. Each entry remembers the file that registered it, for messages. Names that are in neither are looked for among
+the plug-ins of installed packages (:mod:`drivers.core.installed.plugins`), which are imported when they are used.
 """
 
 from __future__ import annotations
 
-import re
 import sys
-import traceback
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from drivers.core.errors import ConfigurationError
+from drivers.core.installed.entries import NAME, explain
+
+if TYPE_CHECKING:
+    from drivers.core.installed.plugins import Plugin
 
 Item = TypeVar("Item")
-
-_NAME = re.compile("[a-z0-9][a-z0-9_-]*")
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,18 @@ class Registry(Generic[Item]):
     Args:
         kind: what an entry is, in one or two words, for messages: "policy", "shape model".
         plural: of that word, unless an s will do.
+        group: of the entry points by which packages offer such entries; "" where they cannot.
+        form: what an entry of a package must be an instance of; None: something that can be called.
     """
 
     _all: ClassVar[list[Registry[Any]]] = []
 
-    def __init__(self, kind: str, plural: str = "") -> None:
-        self.kind, self.plural = kind, plural or f"{kind}s"
+    def __init__(self, kind: str, plural: str = "", group: str = "", form: Any = None) -> None:
+        self.kind, self.plural, self.group, self._form = kind, plural or f"{kind}s", group, form
         self._entries: dict[str, _Entry[Item]] = {}
+        self._loaded: dict[str, _Entry[Item]] = {}
+        """Plug-ins that were used."""
+
         self._all.append(self)
 
     def register(self, name: str, item: Item) -> None:
@@ -54,7 +60,7 @@ class Registry(Generic[Item]):
                 files are named.
         """
         file = sys._getframe(1).f_code.co_filename
-        if not _NAME.fullmatch(name):
+        if not NAME.fullmatch(name):
             what, hint = f"registers a {self.kind} as {name!r}", "Use lower-case letters, digits, _ and -"
             raise ConfigurationError(what, where=file, hint=hint)
         if name in self._entries:
@@ -63,24 +69,67 @@ class Registry(Generic[Item]):
         self._entries[name] = _Entry(item, file)
 
     def __getitem__(self, name: str) -> Item:
-        """The entry of this name. Raises ConfigurationError, which lists the existing names."""
-        if name not in self._entries:
+        """The entry of this name.
+
+        Raises:
+            ConfigurationError: there is none, and the existing names are listed; or its plug-in cannot be loaded.
+        """
+        if (entry := self._entries.get(name) or self._loaded.get(name)) is not None:
+            return entry.item
+        if (plugin := self.plugin(name)) is None:
             raise ConfigurationError(self.unknown(name), where=self.kind, hint=f"{self.listed()}{_EXTENSIONS}")
-        return self._entries[name].item
+        self._loaded[name] = entry = _Entry(self._checked(plugin, plugin.load()), plugin.file)
+        return entry.item
+
+    def _checked(self, plugin: Plugin, item: Any) -> Any:
+        """What a plug-in gave. Raises ConfigurationError where it is not an entry of this kind."""
+        if callable(item) if self._form is None else isinstance(item, self._form):
+            return item
+        what = (
+            f"the plug-in {plugin.name!r} of {plugin.origin} is no {self.kind}, but {type(item).__name__} {item!r:.60}"
+        )
+        raise ConfigurationError(what, where=plugin.file, hint="docs/plugins.md says what it must be")
 
     def __contains__(self, name: object) -> bool:
-        return isinstance(name, str) and name in self._entries
+        return isinstance(name, str) and (name in self._entries or self.plugin(name) is not None)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._entries)
+        yield from self._entries
+        yield from (name for name, one in self.plugins().items() if name not in self._entries and not one.obstacle)
 
     def __len__(self) -> int:
-        return len(self._entries)
+        return sum(1 for _ in self)
+
+    def registered(self) -> tuple[str, ...]:
+        """The names registered by the program and its extensions, without plug-ins: nothing is looked for."""
+        return tuple(self._entries)
+
+    def items(self) -> Iterator[tuple[str, Item]]:
+        """All names with their entries, but for plug-ins that cannot be loaded: nobody asked for these."""
+        for name in self:
+            try:
+                yield name, self[name]
+            except ConfigurationError:
+                continue
+
+    def plugins(self) -> dict[str, Plugin]:
+        """What installed packages offer, by name; also where the name is taken, and this is not used."""
+        if not self.group:
+            return {}
+        from drivers.core.installed.plugins import offered  # late: the command line starts without it
+
+        return offered(self.group)
+
+    def plugin(self, name: str) -> Plugin | None:
+        """The plug-in behind a name; None where it is an entry of the program, of an extension, or of nobody."""
+        return None if name in self._entries else self.plugins().get(name)
 
     def file(self, name: str) -> str:
-        """The file that registered an entry; the empty string for an unknown name."""
-        entry = self._entries.get(name)
-        return "" if entry is None else entry.file
+        """The file that registered an entry, or of the plug-in; the empty string for an unknown name."""
+        if (entry := self._entries.get(name) or self._loaded.get(name)) is not None:
+            return entry.file
+        plugin = self.plugin(name)
+        return "" if plugin is None else plugin.file
 
     def explain(self, name: str, error: Exception) -> str:
         """An error that an entry raised, in one line, with the line of its file where that is known."""
@@ -88,8 +137,13 @@ class Registry(Generic[Item]):
 
     def known(self, name: str) -> str:
         """The checked name; for pydantic fields. Raises ValueError, which lists the existing names."""
-        if name not in self._entries:
+        if name not in self:
             raise ValueError(f"{self.unknown(name)}. {self.listed()}")
+        if name not in self._entries:
+            try:
+                self[name]
+            except ConfigurationError as error:
+                raise ValueError(str(error)) from error
         return name
 
     def unknown(self, name: str) -> str:
@@ -98,21 +152,30 @@ class Registry(Generic[Item]):
 
     def listed(self) -> str:
         """The names as text."""
-        return f"{self.plural[:1].upper()}{self.plural[1:]} are {', '.join(self._entries)}"
+        return f"{self.plural[:1].upper()}{self.plural[1:]} are {', '.join(self)}"
+
+    @classmethod
+    def plugin_problems(cls) -> dict[Plugin, str]:
+        """Why installed plug-ins of the registries that are in use cannot be, without loading them."""
+        found = {}
+        for registry in cls._all:
+            for name, plugin in registry.plugins().items():
+                if name in registry._entries:
+                    found[plugin] = f"has a name that is already used by {registry.file(name)}: choose another"
+                elif plugin.obstacle:
+                    found[plugin] = plugin.obstacle
+        return found
+
+    @classmethod
+    def plugin_files(cls) -> set[str]:
+        """The files of the plug-ins in use."""
+        return {entry.file for registry in cls._all for entry in registry._loaded.values()}
 
     @classmethod
     def withdraw(cls, file: str) -> None:
         """Remove a file's entries from every registry."""
         for registry in cls._all:
             registry._entries = {name: entry for name, entry in registry._entries.items() if entry.file != file}
-
-
-def explain(error: BaseException, file: str) -> str:
-    """An unexpected error in one line: its message, and the line of ``file`` that raised it, if any."""
-    words = " ".join(str(error).split())
-    told = f"{type(error).__name__}: {words}" if words else type(error).__name__
-    lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
-    return f"{told} (line {lines[-1]})" if lines else told
 
 
 _EXTENSIONS = "; others come from files named with --extension"

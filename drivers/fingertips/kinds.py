@@ -14,12 +14,12 @@ from drivers.fingertips.kind import FingertipKind, PalmKind
 from drivers.fingertips.nano17 import Nano17Kind
 from drivers.fingertips.wires import WireKind
 
-FINGERTIPS: Registry[FingertipKind[Any]] = Registry("fingertip kind")
+FINGERTIPS: Registry[FingertipKind[Any]] = Registry("fingertip kind", group="fingertips", form=FingertipKind)
 
 FINGERTIPS.register("nano17", Nano17Kind())
 FINGERTIPS.register("biotac", BioTacKind())
 
-WIRES: Registry[WireKind[Any]] = Registry("wire")
+WIRES: Registry[WireKind[Any]] = Registry("wire", group="wires", form=WireKind)
 
 WIRES.register("net-ft", NetBoxKind())
 WIRES.register("digital", DigitalKind())
@@ -30,8 +30,8 @@ WIRES.register("gauge-volts", VoltsKind())
 
 def palm_kind(tactile: str) -> str | None:
     """The first kind that the palm asks in this way, by name; None where there is none."""
-    kinds = {name: FINGERTIPS[name] for name in FINGERTIPS}
-    return next((name for name, kind in kinds.items() if isinstance(kind, PalmKind) and kind.tactile == tactile), None)
+    kinds = FINGERTIPS.items()
+    return next((name for name, kind in kinds if isinstance(kind, PalmKind) and kind.tactile == tactile), None)
 
 
 def as_palm_kind(name: str) -> PalmKind[Any]:

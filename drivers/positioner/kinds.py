@@ -108,7 +108,7 @@ class PositionerKind:
     emulator_host: str = ""
 
 
-POSITIONERS: Registry[PositionerKind] = Registry("positioner")
+POSITIONERS: Registry[PositionerKind] = Registry("positioner", group="positioners", form=PositionerKind)
 """See ``docs/extending.md`` for adding one."""
 
 

@@ -93,4 +93,4 @@ class SimulatedCalibration:
 
 
 def _packaged_kinds() -> dict[str, FingertipKind[Any]]:
-    return {name: FINGERTIPS[name] for name in FINGERTIPS if FINGERTIPS[name].packaged}
+    return {name: kind for name, kind in FINGERTIPS.items() if kind.packaged}

@@ -41,7 +41,7 @@ The plant is a :class:`~drivers.simulation.hand_plant.TipPlant`. Kinds with thei
 :class:`~drivers.simulation.hand_plant.TouchedPlant`.
 """
 
-SIMULATED_FINGERTIPS: Registry[Simulate] = Registry("simulated fingertip kind")
+SIMULATED_FINGERTIPS: Registry[Simulate] = Registry("simulated fingertip kind", group="simulated_fingertips")
 """The simulation of each kind of fingertip, by its name."""
 
 

@@ -10,7 +10,9 @@ from drivers.simulation.devices.arm_emulator import ArmEmulator
 from drivers.simulation.devices.positioner_emulator import PositionerEmulator
 from drivers.simulation.hand_plant import CarriedPlant
 
-SIMULATED_POSITIONERS: Registry[Callable[[CarriedPlant], Peer]] = Registry("simulated positioner")
+SIMULATED_POSITIONERS: Registry[Callable[[CarriedPlant], Peer]] = Registry(
+    "simulated positioner", group="simulated_positioners"
+)
 """Creates the far end of each kind's transport, for a plant that it moves."""
 
 SIMULATED_POSITIONERS.register("six-axis", PositionerEmulator)

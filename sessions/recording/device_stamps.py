@@ -39,7 +39,7 @@ def positioner_stamp(payload: bytes) -> DeviceStamp:
     return DeviceStamp(_POSITIONER_HEAD.unpack_from(payload)[0])
 
 
-STAMPERS: Registry[Stamper] = Registry("stamper")
+STAMPERS: Registry[Stamper] = Registry("stamper", group="stampers")
 """Readers of a device's counter and clock; most devices have none. By wire name, on a simulated rig by kind.
 """
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from drivers.core.extensions import load_extension, load_named_extensions
-from tactile_lab.cli import bench, experiment, markers, rig
+from tactile_lab.cli import bench, experiment, markers, plugins, rig
 from tactile_lab.cli.calibrate import calibrate
 from tactile_lab.cli.commands import COMMANDS, Commands
 from tactile_lab.cli.running import run, sweep
@@ -36,6 +36,7 @@ COMMANDS.register("calibrate", calibrate.app)
 COMMANDS.register("session", session.app)
 COMMANDS.register("model", model.app)
 COMMANDS.register("rig", rig.app)
+COMMANDS.register("plugins", plugins.plugins)
 
 
 def _show_version(wanted: bool) -> None:

@@ -28,6 +28,13 @@ def complete_object(incomplete: str) -> list[str]:
     return _beginning(incomplete, CATALOGUE)
 
 
+def complete_method(incomplete: str) -> list[str]:
+    """Estimation methods."""
+    from tactile_lab.slam.tracking.trackers import METHODS
+
+    return _beginning(incomplete, METHODS)
+
+
 def complete_policy(incomplete: str) -> list[str]:
     """Exploration policies, those of extensions named in the environment too."""
     from tactile_lab.slam.exploration.policies import POLICIES

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.completion import complete_experiment
-from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, MOST_JOBS, Json, NoInput
+from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, MOST_JOBS, Json, Merge, NoInput, ParquetFile, Scheduler
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -50,6 +50,9 @@ def experiment(
         bool, typer.Option("--store", help="Store the result in the repository and write its pages.")
     ] = False,
     forget: Annotated[bool, typer.Option("--forget", help="With --store: discard results of older versions.")] = False,
+    scheduler: Scheduler = "",
+    merge: Merge = None,
+    parquet: ParquetFile = None,
     docs: Annotated[Path, typer.Option(help="Documentation folder with the stored results and pages.")] = Path("docs"),
     as_json: Json = False,
     no_input: NoInput = False,
@@ -66,8 +69,9 @@ def experiment(
     from tactile_lab.cli.console import answer, emit_json, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
-    from tactile_lab.experiments.reporting import LINES_FILE, document, part_of, write_report
-    from tactile_lab.experiments.runner import RunnerSettings, kept_rows, run_cells
+    from tactile_lab.experiments.parquet import write_parquet
+    from tactile_lab.experiments.reporting import document, part_of, write_report
+    from tactile_lab.experiments.runner import LINES_FILE, RunnerSettings, kept_rows, run_cells
     from tactile_lab.experiments.summary import group_runs, short_table
 
     study, processes = experiment(name), jobs or os.cpu_count() or 1
@@ -76,10 +80,13 @@ def experiment(
     if study.left_out():
         warn(study.left_out())
     with ExperimentProgress(study.name, len(cells)) as progress:
-        settings = RunnerSettings(processes, keep)
+        others = tuple(each / LINES_FILE for each in merge or ())
+        settings = RunnerSettings(processes, keep, scheduler, others=others)
         rows = run_cells(name, cells, study.work, folder / LINES_FILE, settings, progress.on_finished)
     command = _command(name, seeds, only or [], grasps, jobs)
     write_report(study, rows, folder, processes, command)
+    if parquet is not None:
+        write_parquet(parquet, name, rows)
     if store:
         made = _of_study(study, kept_rows(name, folder / LINES_FILE), grasps)
         _store(docs, study, part_of(study, made, processes, command, grasps), forget)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.completion import complete_rig, complete_session
+from tactile_lab.cli.completion import complete_method, complete_rig, complete_session
 
 LARGEST_SEED = 2**32 - 1
 MOST_GRASPS = 1000
@@ -16,25 +15,41 @@ MOST_GRASPS = 1000
 MOST_JOBS = 256
 
 
-class Method(StrEnum):
-    """Estimation methods, named as in :class:`tactile_lab.slam.tactile_slam.SlamSettings`."""
-
-    JOINT = "joint"
-    PARTICLE = "particle"
-    THESIS_PF = "thesis-pf"
-    THESIS_PF_GRAPH = "thesis-pf-graph"
-    KNOWN_POSE = "known-pose"
-    ODOMETRY = "odometry"
-    ICP = "icp"
+OUR_METHODS = ("joint", "particle", "thesis-pf", "thesis-pf-graph", "known-pose", "odometry", "icp")
+"""Estimation methods, named as in :class:`tactile_lab.slam.tactile_slam.SlamSettings`; plug-ins have more."""
 
 
-METHOD_HELP = (
+def _known_method(name: str | None) -> str | None:
+    """The method, once it is known that there is one; the estimation itself is loaded for others' methods only."""
+    if name is None or name in OUR_METHODS:
+        return name
+    from tactile_lab.slam.tracking.trackers import METHODS
+
+    if name not in METHODS:
+        known = ", ".join(map(repr, METHODS))
+        raise typer.BadParameter(f"{name!r} is not one of {known}.")
+    return name
+
+
+_METHOD_HELP = (
     "joint: shape and trajectory estimated together; particle: calibrated particle filter; thesis-pf: "
     "the filter as printed "
     "in the thesis, -graph with its pose graph; baselines: known-pose (the true poses), "
-    "odometry, icp."
+    "odometry, icp; or the method of an extension or plug-in."
 )
-
+MethodName = Annotated[
+    str, typer.Option("--method", help=_METHOD_HELP, callback=_known_method, autocompletion=complete_method)
+]
+OtherMethod = Annotated[
+    str | None,
+    typer.Option(
+        "--method",
+        help=_METHOD_HELP,
+        callback=_known_method,
+        autocompletion=complete_method,
+        show_default="from the session; joint for a log",
+    ),
+]
 
 SHAPE_HELP = (
     "Model of the final shape. auto: smooth field or facets, chosen by evidence; others: gpis, facets, superquadric, "
@@ -83,4 +98,21 @@ NoInput = Annotated[
         "a "
         "simulated operator leads guided sessions.",
     ),
+]
+
+Scheduler = Annotated[
+    str,
+    typer.Option(
+        metavar="ADDRESS",
+        help="Run on the workers of this Dask scheduler (tcp://host:8786, or tls:// with Dask's own configuration).",
+    ),
+]
+Merge = Annotated[
+    list[Path] | None,
+    typer.Option(
+        metavar="FOLDER", help="Take over the finished runs of this folder, from another machine. Can be repeated."
+    ),
+]
+ParquetFile = Annotated[
+    Path | None, typer.Option("--parquet", metavar="FILE", help="Write all runs as a Parquet table, too.")
 ]

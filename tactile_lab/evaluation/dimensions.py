@@ -59,10 +59,10 @@ def _estimated(estimate: EstimateWithTruth) -> tuple[Array, Array] | None:
         outline = read_contour(path)
         return (outline.points_m, outline.sigma_m) if len(outline.sigma_m) else None
     try:
-        mesh, sigma_m = read_estimated_mesh(path)
+        found = read_estimated_mesh(path)
     except ShapeError:  # the evaluation's warnings say why
         return None
-    return np.asarray(mesh.vertices, dtype=float), sigma_m
+    return np.asarray(found.mesh.vertices, dtype=float), found.sigma_m
 
 
 def _true_points(estimate: EstimateWithTruth) -> Array | None:

@@ -23,7 +23,13 @@ from tactile_lab.evaluation.shape import (
     horizontal_outline,
 )
 from tactile_lab.evaluation.trajectory import compared_grasps, estimate_T_truth
-from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, symmetry_turns
+from tactile_lab.evaluation.truth.rotational_symmetry import (
+    ORIGIN_m,
+    modulo_symmetry,
+    outline_symmetry,
+    symmetry_turns,
+)
+from tactile_lab.slam.doubt.symmetry import Symmetry
 
 
 @dataclass(frozen=True)
@@ -61,15 +67,29 @@ class EstimateWithTruth:
         return self.results.trajectory.world_T_object
 
     @cached_property
+    def symmetry(self) -> Symmetry | None:
+        """Rotational symmetry of the true surface about its own axis, or of the true outline; None if it has none."""
+        if self.truth.mesh is not None:
+            turns = symmetry_turns(self.truth.mesh)
+            return None if turns is None else Symmetry(turns, ORIGIN_m)
+        return None if self.truth.outline_m is None else outline_symmetry(self.truth.outline_m)
+
+    @property
     def symmetry_turns(self) -> int | None:
-        """Rotational symmetry of the object about its axis; None if it has none or its surface is unknown."""
-        return None if self.truth.mesh is None else symmetry_turns(self.truth.mesh)
+        """Order of that symmetry; None if there is none or the true shape is unknown."""
+        return None if self.symmetry is None else self.symmetry.order
+
+    @property
+    def poses_modulo_symmetry(self) -> tuple[Pose3 | None, ...]:
+        """The estimated poses, turned by symmetries of the object towards the true heading."""
+        centre_m = ORIGIN_m if self.symmetry is None else self.symmetry.centre_m
+        return modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns, centre_m)
 
     @cached_property
     def registration_rms_mm(self) -> float | None:
         """See :func:`tactile_lab.evaluation.registration.registration_rms_mm`; rotations of symmetry do not count."""
         points = [rows.points_world_m for rows in self.results.contacts]
-        told = modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns)
+        told = self.poses_modulo_symmetry
         return registration_rms_mm(points, told, self.truth.world_T_object, self.results.dimension)
 
     @cached_property

@@ -6,6 +6,7 @@ no mesh, no shape) are None in the record and null in the file.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -50,6 +51,10 @@ class Evaluation:
             see :func:`tactile_lab.evaluation.truth.rotational_symmetry.symmetry_turns`; None for none.
         uncertainty: see :class:`UncertaintyFigures`; None without a shape.
         sensing: see :class:`SensingFigures`; None without sightings or mesh.
+        status: "complete", "partial", "ambiguous" or "lost", see :mod:`tactile_lab.slam.doubt.status`.
+        known_share: share of the outline or surface that was touched, 0 to 1; None if unknown.
+        doubts: name, words, grasps (from 0) of each reason to doubt the result, and whether it is grave.
+        alternatives: other placings of grasps: their numbers, probability, largest turn and shift.
         failed: the object was lost or the registration error is above 5 mm; None if neither is known.
         warnings: why the result should not be trusted, as sentences.
         further: metrics of extensions by name; left out of the file if there are none.
@@ -78,6 +83,9 @@ class Evaluation:
     time: TimeFigures | None
     truth: TruthFigures | None
     status: str
+    known_share: float | None
+    doubts: tuple[Mapping[str, Any], ...]
+    alternatives: tuple[Mapping[str, Any], ...]
     warnings: tuple[str, ...]
     further: Mapping[str, Any] = field(default_factory=dict)
 
@@ -121,11 +129,25 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
         grasps=len(poses),
         contacts=sum(len(rows.fingers) for rows in results.contacts),
         aligned="first_grasp",
-        status=str(results.slam["status"]),
+        status=results.status,
+        known_share=results.known_share,
+        doubts=tuple(results.slam.get("doubts", ())),
+        alternatives=tuple(map(_as_figures, results.slam.get("alternatives", ()))),
         warnings=(*result_warnings(results), *incomparable, *failures),
         further=figures,
         **ours,
     )
+
+
+def _as_figures(alternative: Mapping[str, Any]) -> dict[str, Any]:
+    """An alternative of ``slam.json`` for people: without its poses, in millimetres and degrees."""
+    return {
+        "grasps": alternative["grasps"],
+        "probability": alternative["probability"],
+        "turn_deg": math.degrees(alternative["turn_rad"]),
+        "shift_mm": 1e3 * alternative["shift_m"],
+        "rms_mm": 1e3 * alternative["rms_m"],
+    }
 
 
 def _round(value: Any) -> Any:

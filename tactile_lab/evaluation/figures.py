@@ -98,7 +98,7 @@ class TruthFigures:
 Figure: TypeAlias = Callable[[EstimateWithTruth], Any]
 """Computes a metric: a number, or anything else that :func:`tactile_lab.evaluation.files.plain.plain` can write."""
 
-FIGURES: Registry[Figure] = Registry("evaluation figure")
+FIGURES: Registry[Figure] = Registry("evaluation figure", group="figures")
 """All metrics by their name in ``evaluation.json``. See ``docs/extending.md`` for adding one."""
 
 
@@ -182,7 +182,7 @@ def _sensing(estimate: EstimateWithTruth) -> SensingFigures | None:
 
 
 def _failed(estimate: EstimateWithTruth) -> bool | None:
-    if str(estimate.results.slam["status"]) != "ok":
+    if estimate.results.status == "lost":
         return True
     error_mm = estimate.registration_rms_mm
     return None if error_mm is None else error_mm > FAILURE_LIMIT_MM

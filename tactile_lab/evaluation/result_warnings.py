@@ -6,9 +6,7 @@ import numpy as np
 
 from drivers.core.contact_checks import touched_one_side
 from tactile_lab.evaluation.files.results import Results
-
-UNSUPPORTED_SIGMA_m = 0.005
-"""Where the shape is less certain than this it is only interpolated between contacts."""
+from tactile_lab.slam.doubt.known_part import LARGEST_SIGMA_m
 
 _WORTH_TELLING = 0.1
 
@@ -16,11 +14,12 @@ _WORTH_TELLING = 0.1
 def result_warnings(results: Results) -> tuple[str, ...]:
     """All warnings about the results of an estimation."""
     said = (_warn_if_lost(results), _one_sided(results), _no_shape(results), _warn_of_guesses(results))
-    return (*results.slam.get("warnings", ()), *(text for text in said if text))
+    doubts = [doubt["words"] for doubt in results.slam.get("doubts", ())]
+    return (*results.slam.get("warnings", ()), *(text for text in said if text), *doubts)
 
 
 def _warn_if_lost(results: Results) -> str:
-    if results.slam["status"] == "ok":
+    if results.status != "lost":
         return ""
     untracked = sum(step["verdict"] == "untracked" for step in results.slam["steps"])
     return f"the object is lost: {untracked} of {len(results.slam['steps'])} grasps could not be registered"
@@ -37,9 +36,9 @@ def _no_shape(results: Results) -> str:
 
 
 def _warn_of_guesses(results: Results) -> str:
+    """Older results have no known share: there the standard deviation alone says what is a guess."""
     if (sigma_m := results.sigma_quantiles_m) is None:
         return ""
-    share = float(np.mean(sigma_m > UNSUPPORTED_SIGMA_m))
-    if share <= _WORTH_TELLING:
-        return ""
-    return f"{share:.0%} of the shape is a guess between contacts: uncertain by more than 5 mm"
+    known = results.known_share
+    share = float(np.mean(sigma_m > LARGEST_SIGMA_m)) if known is None else 1.0 - known
+    return f"{share:.0%} of the shape is a guess: nothing was touched near it" if share > _WORTH_TELLING else ""

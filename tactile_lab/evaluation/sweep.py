@@ -43,8 +43,8 @@ class SweepRow:
             return self.problem or "no evaluation"
         if early := self.evaluation.get("ended_early"):
             return f"ended {early}"
-        if self.evaluation.get("status") != "ok":
-            return f"object {self.evaluation.get('status')}"
+        if self.evaluation.get("status") == "lost":
+            return "object lost"
         if self.evaluation.get("failed"):
             return f"registration above {FAILURE_LIMIT_MM:g} mm"
         return "" if self.figure("shape_best_fit", "hausdorff_mm") is not None else "no shape"

@@ -133,7 +133,8 @@ def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
         ),
         EvaluationRow("Marker sightings", _text(truth.get("seen"), 0), "", f"{_of('grasp', missing)} without one"),
         EvaluationRow("Step time", _text(time.get("step_ms_median"), 0), "ms", spread),
-        EvaluationRow("Tracking", str(evaluation.get("status", UNKNOWN)), "", "ok or lost"),
+        EvaluationRow("Status", str(evaluation.get("status", UNKNOWN)), "", "complete, partial, ambiguous or lost"),
+        EvaluationRow("Touched", _percent(evaluation.get("known_share")), "", "of the shape; the rest is a guess"),
     ]
 
 
@@ -164,6 +165,10 @@ def _verdict(evaluation: Mapping[str, Any]) -> str:
 
 def _loop_note(loops: Mapping[str, Any]) -> str:
     return f"of {_text(loops.get('tested'), 0)} tested, {_text(loops.get('wrong'), 0)} of the accepted wrong"
+
+
+def _percent(share: float | None) -> str:
+    return UNKNOWN if share is None else f"{share:.0%}"
 
 
 def _text(value: float | None, digits: int) -> str:

@@ -8,10 +8,15 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
 
+from drivers.core.errors import TactileLabError
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 
 Value: TypeAlias = str | int | float
 Setting: TypeAlias = tuple[tuple[str, Value], ...]
+
+
+FOLLOWED = ("ok", "complete", "partial", "ambiguous")
+"""Status of a run whose object could be followed, or that did what it should ("ok")."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +64,8 @@ class Row:
         """Why the run counts as failed, or ""."""
         if self.figures is None:
             return self.problem
-        if self.figures.get("status", "ok") != "ok":
-            return f"object {self.figures['status']}"
+        if (status := self.figures.get("status", "ok")) not in FOLLOWED:
+            return f"object {status}"
         registration = self.figures.get("registration_mm")
         if registration is not None and registration > FAILURE_LIMIT_MM:
             return f"registration above {FAILURE_LIMIT_MM:g} mm"
@@ -84,6 +89,16 @@ class Row:
 
 Work: TypeAlias = Callable[[Cell], Mapping[str, Any]]
 """Runs a cell and returns its figures; a function at module level, so that other processes can import it."""
+
+
+def execute(cell: Cell, work: Work) -> Row:
+    """Run one cell; any error becomes the result of this run, and the others continue."""
+    try:
+        return Row(cell, work(cell))
+    except TactileLabError as error:
+        return Row(cell, None, str(error))
+    except Exception as error:  # a defect appears in the table as a failed run with its name
+        return Row(cell, None, f"{type(error).__name__}: {error}")
 
 
 def grid(**values: Sequence[Value]) -> list[Setting]:

@@ -1,13 +1,14 @@
 """Figures of one run: quality of the shape, the tracking and the stated uncertainty, and computing time.
 
 Shape: Hausdorff and mean distance (appendix C) after the best rigid alignment. Tracking: registration error; rotations
-    of a solid about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
+    of an object about its axis of symmetry, which no contact can distinguish, are ignored. Uncertainty: share of the
     surface whose true error is within two stated standard deviations, and shares of surface and poses inside their
     stated 50, 68 and 95 % regions (:mod:`tactile_lab.evaluation.consistency`).
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from tactile_lab.evaluation.consistency.poses import birth_frame, common_frame, 
 from tactile_lab.evaluation.consistency.surfaces import SurfaceConsistency, mesh_consistency, outline_consistency
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.trajectory import Poses
-from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, stands, symmetry_turns
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, outline_symmetry, stands, symmetry_turns
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
@@ -75,11 +76,15 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
 
 def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
     """Stated pose covariances against the truth, in the first grasp's object frame and in the best common one."""
-    truth, turns = data.world_T_body, symmetry_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
-    poses, stated = modulo_symmetry(result.world_T_object, truth, turns), covariances_in_world(result)
+    truth, poses = data.world_T_body, _modulo_symmetry(data, result.world_T_object)
+    stated = covariances_in_world(result)
+    in_common = covariances_in_world(replace(result, covariances=result.common_covariances or result.covariances))
     figures: dict[str, Any] = {}
-    for name, frame in (("", birth_frame(poses, truth)), ("common_", common_frame(poses, truth))):
-        judged = pose_consistency(poses, stated, truth, frame)
+    for name, given, frame in (
+        ("", stated, birth_frame(poses, truth)),
+        ("common_", in_common, common_frame(poses, truth)),
+    ):
+        judged = pose_consistency(poses, given, truth, frame)
         if judged is not None:
             figures |= {
                 f"{name}poses_inside": list(judged.inside),
@@ -91,10 +96,16 @@ def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
 
 def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
     """Registration error of a trajectory; rotations that no contact can distinguish are ignored."""
-    turns = symmetry_turns(data.mesh) if isinstance(data, SpatialGrasps) else None
-    poses = modulo_symmetry(estimate, data.world_T_body, turns)
+    poses = _modulo_symmetry(data, estimate)
     contacts = [grasp.points_world_m for grasp in data.grasps]
     return registration_rms_mm(contacts, poses, data.world_T_body, dimension)
+
+
+def _modulo_symmetry(data: SimulatedGrasps, estimate: Poses) -> Poses:
+    if isinstance(data, SpatialGrasps):
+        return modulo_symmetry(estimate, data.world_T_body, symmetry_turns(data.mesh))
+    found = outline_symmetry(data.outline_m) if isinstance(data, PlanarGrasps) else None
+    return estimate if found is None else modulo_symmetry(estimate, data.world_T_body, found.order, found.centre_m)
 
 
 def _within(errors_m: Array, sigma_m: Array) -> float:

@@ -1,51 +1,31 @@
-"""Runs the cells of an experiment in worker processes and stores every result as soon as it is finished.
+"""Runs the cells of an experiment and stores every result as soon as it is finished.
 
 The file starts with a line that names the experiment and the version of the program; one line of JSON for each finished
 run follows. An interrupted experiment resumes where it stopped; results of another version are mixed in only on
 request. A run that ends in an error becomes a failed run with its reason. Results depend only on the cells, not on the
-number of processes; times do.
+number of processes or machines; times do.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
-import multiprocessing
-import os
-import signal
-import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache, partial
-from multiprocessing.process import BaseProcess
-from multiprocessing.queues import SimpleQueue
+from functools import partial
 from pathlib import Path
 from typing import IO
 
 from drivers.core.atomic_files import write_whole
-from drivers.core.errors import SessionError, TactileLabError
-from drivers.core.extensions import load_named_extensions
-from tactile_lab.experiments.cells import Cell, Row, Work
+from drivers.core.errors import SessionError
+from tactile_lab.experiments.cells import Cell, Row, Work, execute
+from tactile_lab.experiments.execution.cluster import run_on_cluster
+from tactile_lab.experiments.execution.process_pool import run_in_processes
+from tactile_lab.experiments.execution.source_version import version
 
 FORMAT = "tactile-experiment/1"
+LINES_FILE = "runs.jsonl"
 SEVERAL = "several versions"
 """Version in a file with results of several versions, so that no version takes them for its own."""
-ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
-"""Limits the libraries of a worker to one thread: small matrices are faster this way, and sums are reproducible."""
-
-_LOOK_s = 0.5
-"""Longest wait: a Ctrl+C just before a wait would otherwise be noticed only when the next run is finished."""
-_ASKED = 25
-"""Number and total time of attempts to read the exit code of a process that has died."""
-_ROOT = Path(__file__).resolve().parents[2]
-_PLOTS = ("plots", "plot_data", "plot_sheet")
-_PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
-_WITHOUT = ("cli", "workflow", "view", "report", "experiments/results", *(f"experiments/{name}.py" for name in _PLOTS))
-"""Parts of tactile_lab that only present results or read commands, except for these modules:"""
-_WITH = tuple(f"workflow/{name}.py" for name in ("attending", "calibrating_forearm", "finishing", "running"))
 
 Finished = Callable[[Row, int, int], None]
 """Called with each finished run, the number of finished runs, and the total."""
@@ -58,10 +38,16 @@ class RunnerSettings:
     Attributes:
         jobs: number of processes; with 1 all runs are made in this process.
         keep: whether to keep the results of another version of the program.
+        scheduler: address of a Dask scheduler whose workers make the runs instead; "" for none.
+        shared: a folder that all workers of a cluster have to see, as the runs write into it.
+        others: files of results from other machines, whose finished runs count as made.
     """
 
     jobs: int = 1
     keep: bool = False
+    scheduler: str = ""
+    shared: Path | None = None
+    others: tuple[Path, ...] = ()
 
 
 def run_cells(
@@ -79,19 +65,22 @@ def run_cells(
         cells: the runs to make.
         work: runs one cell; must be picklable if there is more than one process.
         file: file of results, created if missing.
-        settings: number of processes, and which results to keep.
+        settings: where to run, and which results to keep.
         finished: called after each run.
 
     Raises:
         SessionError: the file belongs to another experiment, cannot be read, or a process died.
+        ConfigurationError: the cluster cannot be used.
         WriteError: the file cannot be written.
     """
     settings = settings or RunnerSettings()
     known, by = _known_rows(name, file, settings.keep)
+    for other in settings.others:
+        known = {**_rows_of_another_machine(name, other), **known}
     missing = [cell for cell in cells if cell.key not in known]
     done = len(cells) - len(missing)
     with _appending(name, file, by, list(known.values())) as out:
-        for row in _execute(missing, work, settings.jobs):
+        for row in _execute(missing, work, settings):
             known[row.cell.key] = row
             out.write(_line(row.as_json()))
             out.flush()
@@ -100,140 +89,27 @@ def run_cells(
     return [known[cell.key] for cell in cells]
 
 
-def execute(cell: Cell, work: Work) -> Row:
-    """Run one cell; any error becomes the result of this run, and the others continue."""
-    try:
-        return Row(cell, work(cell))
-    except TactileLabError as error:
-        return Row(cell, None, str(error))
-    except Exception as error:  # a defect appears in the table as a failed run with its name
-        return Row(cell, None, f"{type(error).__name__}: {error}")
-
-
-def _execute(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
-    if jobs == 1 or len(cells) < 2:
+def _execute(cells: Sequence[Cell], work: Work, settings: RunnerSettings) -> Iterator[Row]:
+    if settings.scheduler:
+        return run_on_cluster(cells, work, settings.scheduler, settings.shared)
+    if settings.jobs == 1 or len(cells) < 2:
         return map(partial(execute, work=work), cells)
-    return _in_processes(cells, work, jobs)
-
-
-@contextmanager
-def _inherited() -> Iterator[None]:
-    """Set the environment of workers: one thread each, and no imports from the current folder."""
-    wanted = {**ONE_THREAD, "PYTHONSAFEPATH": "1"}
-    own = {name: os.environ.get(name) for name in wanted}
-    os.environ.update(wanted)
-    try:
-        yield
-    finally:
-        for name, value in own.items():
-            os.environ.pop(name)
-            if value is not None:
-                os.environ[name] = value
-
-
-def _in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[Row]:
-    """Yields rows as they are finished; the processes end with this generator, however it ends."""
-    context = multiprocessing.get_context("spawn")
-    watch = _WorkerWatch(context.SimpleQueue(), cells)
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker, initargs=(watch.begun,))
-    try:
-        with _inherited():
-            waiting = {pool.submit(_execute_in_worker, cell, work) for cell in cells}
-        while waiting:
-            watch.look(pool)
-            ready, waiting = wait(waiting, _LOOK_s, return_when=FIRST_COMPLETED)
-            for future in ready:
-                yield future.result()
-    except BrokenProcessPool as error:
-        hint = "Memory may have run out: use fewer --jobs. Finished runs are kept: the same command resumes behind them"
-        raise SessionError(watch.deaths(), where="workers", hint=hint) from error
-    finally:
-        _end(pool)
-
-
-def _end(pool: ProcessPoolExecutor) -> None:
-    """End the workers at once: a run may take a minute, and its result is no longer needed."""
-    for process in multiprocessing.active_children():
-        process.terminate()
-    pool.shutdown(wait=True, cancel_futures=True)
-
-
-class _WorkerWatch:
-    """Tracks the current run of each worker, so that the report of a dead worker can name it.
-
-    Args:
-        begun: queue to which workers write their process id and the key of the run that they start.
-        cells: all runs.
-    """
-
-    def __init__(self, begun: SimpleQueue[tuple[int, str]], cells: Sequence[Cell]) -> None:
-        self.begun = begun
-        self._cells = {cell.key: cell for cell in cells}
-        self._at: dict[int, str] = {}
-        self._processes: dict[int, BaseProcess] = {}
-
-    def look(self, pool: ProcessPoolExecutor) -> None:
-        """Update the list of workers and of the runs that they have started."""
-        self._processes.update(pool._processes or {})
-        self._hear()
-
-    def _hear(self) -> None:
-        while not self.begun.empty():
-            process_id, key = self.begun.get()
-            self._at[process_id] = key
-
-    def deaths(self) -> str:
-        """Describe which workers died, why, and in which run; the pool ends the others by SIGTERM."""
-        self._hear()
-        codes = {number: _exit_code(process) for number, process in self._processes.items()}
-        ended = {number: code for number, code in codes.items() if code}
-        own = {number: code for number, code in ended.items() if code != -signal.SIGTERM} or ended
-        told = [f"{_cause(code)} at {self._words(number)}" for number, code in own.items()]
-        return f"a worker process was {'; '.join(told)}" if told else "a worker process died"
-
-    def _words(self, process_id: int) -> str:
-        key = self._at.get(process_id)
-        return "its start" if key is None else self._cells[key].words()
-
-
-def _exit_code(process: BaseProcess) -> int | None:
-    """The exit code of a process. It may come late: the pipe closes earlier, and the pool's own thread may be reading
-    it.
-    """
-    for _ in range(_ASKED):
-        if process.exitcode is not None:
-            break
-        time.sleep(_LOOK_s / _ASKED)
-    return process.exitcode
-
-
-def _cause(code: int) -> str:
-    if code > 0:
-        return f"ended with exit code {code}"
-    return f"killed by {signal.Signals(-code).name}"
-
-
-_begun: SimpleQueue[tuple[int, str]] | None = None
-"""In a worker: the queue to which it reports each run that it starts."""
-
-
-def _execute_in_worker(cell: Cell, work: Work) -> Row:
-    if _begun is not None:
-        _begun.put((os.getpid(), cell.key))
-    return execute(cell, work)
-
-
-def _prepare_worker(begun: SimpleQueue[tuple[int, str]]) -> None:
-    """Ignore Ctrl+C, which reaches every process of a terminal but is handled by the parent; load extensions."""
-    global _begun
-    _begun = begun
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    load_named_extensions()
+    return run_in_processes(cells, work, settings.jobs)
 
 
 def kept_rows(name: str, file: Path) -> list[Row]:
     """All results in the file that this version of the program made. Raises SessionError as :func:`run_cells`."""
     return list(_known_rows(name, file, keep=False)[0].values())
+
+
+def _rows_of_another_machine(name: str, file: Path) -> dict[str, Row]:
+    if not file.is_file():
+        raise SessionError("no results here", where=str(file), hint=f"Give the folder that contains {LINES_FILE}")
+    rows, by = _known_rows(name, file, keep=True)
+    if by == SEVERAL:
+        hint = "Merge results of one version only: the same commit on every machine"
+        raise SessionError("was made by another version of the program", where=str(file), hint=hint)
+    return rows
 
 
 def _known_rows(name: str, file: Path, keep: bool) -> tuple[dict[str, Row], str]:
@@ -272,19 +148,3 @@ def _appending(name: str, file: Path, by: str, rows: list[Row]) -> IO[str]:
 
 def _line(document: object) -> str:
     return json.dumps(document, allow_nan=False) + "\n"
-
-
-@cache
-def version() -> str:
-    """Hash of the sources that results depend on."""
-    digest = hashlib.sha256()
-    for path in sources():
-        digest.update(path.relative_to(_ROOT).as_posix().encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def sources() -> list[Path]:
-    """Files that results depend on: programs, and the rigs' descriptions and calibrations."""
-    files = (path for part in _PARTS for path in (_ROOT / part).rglob("*") if path.suffix in {".py", ".yaml"})
-    left_out, taken = ([_ROOT / "tactile_lab" / name for name in names] for names in (_WITHOUT, _WITH))
-    return sorted(path for path in files if path in taken or not any(map(path.is_relative_to, left_out)))

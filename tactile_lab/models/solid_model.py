@@ -142,7 +142,8 @@ def _read_surface(path: Path) -> tuple[trimesh.Trimesh, Array]:
     if not path.is_file():
         hint = "Too few contacts enclose nothing: touch the object more often"
         raise ShapeError("there is no estimated surface", where=str(path), hint=hint)
-    return read_estimated_mesh(path)
+    found = read_estimated_mesh(path)
+    return found.mesh, found.sigma_m
 
 
 def _standing_hull(corners: Array) -> trimesh.Trimesh:

@@ -49,7 +49,7 @@ class SessionFacts:
 
 @dataclass(frozen=True)
 class Surface:
-    """A triangle mesh in the estimate's object frame with a standard deviation at each vertex."""
+    """A triangle mesh in the estimate's object frame with a standard deviation at each vertex, NaN for a guess."""
 
     vertices_m: Array
     faces: Faces
@@ -105,7 +105,7 @@ class ReportContent:
         evaluation: ``evaluation.json``, or None if the session was not evaluated.
         surface: the estimated surface, or None if there is none.
         contour_m: the estimated contour or section, shape (n, 2), estimate's object frame, or None.
-        contour_sigma_m: standard deviation at each point of the contour, shape (n,).
+        contour_sigma_m: standard deviation at each point of the contour, shape (n,); NaN where it is a guess.
         truth: ground truth, or None.
         fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
         course: decisions and stops of the session.
@@ -135,10 +135,13 @@ class ReportContent:
         return 1e3 * float(np.sqrt(variances[:3].sum())), float(np.degrees(np.sqrt(variances[3:].sum())))
 
     def band_m(self) -> tuple[Array, ...]:
-        """The contour moved by two standard deviations outward and inward, each of shape (n, 2); empty if unknown."""
+        """The contour moved by two standard deviations outward and inward, each of shape (n, 2); empty if unknown.
+
+        Where it is a guess it has no band.
+        """
         if self.contour_m is None or len(self.contour_sigma_m) != len(self.contour_m):
             return ()
-        aside = 2.0 * self.contour_sigma_m[:, None] * outward_normals(self.contour_m)
+        aside = 2.0 * np.nan_to_num(self.contour_sigma_m)[:, None] * outward_normals(self.contour_m)
         return self.contour_m + aside, self.contour_m - aside
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from gtsam import Pose3
+from numpy.typing import NDArray
 
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.poses import planar
@@ -66,8 +67,23 @@ def _draw_contour(chart: Chart, content: ReportContent) -> None:
     chart.area([1e3 * outer, 1e3 * inner[::-1]], "band")
     high_mm = sigma_scale_mm(sigma_m)
     middle = (sigma_m + np.roll(sigma_m, -1)) / 2
-    for start, end, colour in zip(ring, np.roll(ring, -1, axis=0), sigma_colours(middle, high_mm), strict=True):
+    ends, known = np.roll(ring, -1, axis=0), np.isfinite(middle)
+    for piece in _pieces(ring, ~known):
+        chart.path(piece, "guess")
+    colours = sigma_colours(middle[known], high_mm)
+    for start, end, colour in zip(ring[known], ends[known], colours, strict=True):
         chart.segment(start, end, "contour", f"stroke:{colour}")
+
+
+def _pieces(ring: Array, chosen: NDArray[np.bool_]) -> list[Array]:
+    """The connected lines of a closed ring's chosen segments; segment i leads from point i to the next one."""
+    if not chosen.any() or chosen.all():
+        return [np.vstack([ring, ring[:1]])] if chosen.any() else []
+    opening = int(np.argmin(chosen))  # starts at a gap, so that no piece is split at the end of the arrays
+    order = np.roll(np.arange(len(ring)), -opening)
+    steps = np.diff(chosen[order].astype(int), append=0)
+    pairs = zip(np.flatnonzero(steps > 0) + 1, np.flatnonzero(steps < 0) + 1, strict=True)
+    return [ring[order[np.arange(first, last + 1) % len(ring)]] for first, last in pairs]
 
 
 def _draw_contacts(chart: Chart, grasp: PlacedContacts) -> None:

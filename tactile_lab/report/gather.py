@@ -101,7 +101,9 @@ def read_surface(path: Path) -> Surface:
     Raises:
         ShapeError: not a mesh written by this program.
     """
-    mesh, sigma_m = read_estimated_mesh(path)
+    found = read_estimated_mesh(path)
+    sigma_m = np.where(found.known, found.sigma_m, np.nan)
+    mesh = found.mesh
     return Surface(np.asarray(mesh.vertices), np.asarray(mesh.faces), sigma_m, np.asarray(mesh.vertex_normals))
 
 
@@ -124,7 +126,8 @@ def _contour(path: Path, results: Results) -> tuple[Array | None, Array]:
         return None, np.zeros(0)
     outline = read_contour(path)
     older = results.slam.get("contour_sigma_m") or ()  # where older results have them
-    return outline.points_m, outline.sigma_m if len(outline.sigma_m) else np.array(older, dtype=float)
+    sigma_m = outline.sigma_m if len(outline.sigma_m) else np.array(older, dtype=float)
+    return outline.points_m, np.where(outline.known, sigma_m, np.nan) if len(sigma_m) == len(outline.known) else sigma_m
 
 
 def _truth(session: Session, folder: Path, results: Results) -> TrueShape | None:

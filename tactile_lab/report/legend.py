@@ -6,6 +6,7 @@ from tactile_lab.report.markup import Markup, element
 
 _SAMPLES = {
     "contour": '<line class="contour" x1="3" y1="6" x2="21" y2="6" style="stroke:#21918c"/>',
+    "guess": '<path class="guess" d="M1 6H23"/>',
     "contour_band": '<rect class="band" x="1" y="1" width="22" height="10"/>',
     "estimate": '<path class="estimate" d="M1 6H23"/>',
     "truth-fit": '<path class="truth-fit" d="M1 6H23"/>',

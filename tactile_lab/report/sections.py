@@ -18,7 +18,12 @@ from tactile_lab.report.rendering import VIEWS, views
 from tactile_lab.report.uncertainty_figures import camera_picture, error_over_grasps
 from tactile_lab.report.viewer import surface_colours, viewer_data
 
-_STATUS = {"ok": ("tracked", "good"), "lost": ("object lost", "bad")}
+_STATUS = {
+    "complete": ("complete", "good"),
+    "partial": ("partly known", "warn"),
+    "ambiguous": ("ambiguous", "bad"),
+    "lost": ("object lost", "bad"),
+}
 
 
 def head(content: ReportContent) -> Markup:
@@ -47,7 +52,9 @@ def head(content: ReportContent) -> Markup:
 
 
 def _badges(content: ReportContent) -> list[Markup]:
-    text, kind = _STATUS.get(str(content.results.slam["status"]), (str(content.results.slam["status"]), "warn"))
+    status, share = content.results.status, content.results.known_share
+    text, kind = _STATUS.get(status, (status, "warn"))
+    text += "" if share is None else f", {share:.0%} touched"
     found = [badge(text, kind)]
     if content.evaluation is None:
         found.append(badge("not evaluated", "warn"))
@@ -130,6 +137,8 @@ def _shape_lead(content: ReportContent) -> str:
 
 def _top_view_card(content: ReportContent, picture: str) -> Markup:
     keys = [("contour", "estimate"), ("contour_band", "two standard deviations"), ("contact", "contact with normal")]
+    if not np.isfinite(content.contour_sigma_m).all():
+        keys.insert(1, ("guess", "guess: nothing was touched near it"))
     if content.truth_outline_m() is not None:
         keys.insert(1, ("truth", "true outline, aligned at the first grasp"))
     if content.fitted_outline_m is not None:

@@ -141,7 +141,7 @@ class RigDescription(StrictModel):
         if self.emulated and self.kind != "wired":
             raise ValueError("emulated is only for kind wired: a simulated rig needs no emulators")
         if self.wires is not None and bool(self.wires.fingertips) != isinstance(self.fingertip_kind, LinkedKind):
-            linked = ", ".join(name for name in FINGERTIPS if isinstance(FINGERTIPS[name], LinkedKind))
+            linked = ", ".join(name for name, kind in FINGERTIPS.items() if isinstance(kind, LinkedKind))
             raise ValueError(f"wires.fingertips is only for fingertips with wires ({linked}): others use the palm's")
         if self.wires is not None and self.wires.camera is not None and self.calibration.camera is None:
             raise ValueError("wires.camera needs calibration.camera and calibration.markers")

@@ -106,7 +106,7 @@ Emulate: TypeAlias = Callable[[ExitStack, Any, EmulatedSensor, Path], None]
 Raises OSError, CanError or ValueError when the place cannot be had.
 """
 
-EMULATORS: Registry[Emulate] = Registry("emulator of a wire", "emulated wires")
+EMULATORS: Registry[Emulate] = Registry("emulator of a wire", "emulated wires", group="emulators")
 """How ``rig emulate`` serves a wire, by its name; one without is told so."""
 
 

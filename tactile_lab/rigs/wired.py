@@ -218,7 +218,7 @@ def _base_start(rig: Rig) -> dict[str, Any]:
 
 def _with_emulator(rig: Rig, finger: str, wiring: WireSettings) -> WireSettings:
     if not WIRES[wiring.wire].emulator_host:
-        fed = ", ".join(name for name in WIRES if WIRES[name].emulator_host)
+        fed = ", ".join(name for name, wire in WIRES.items() if wire.emulator_host)
         where = f"{rig.source}: wires.fingertips.{finger}"
         raise ConfigurationError(f"the simulated plant feeds only {fed} wires", where=where, hint=f"Use wire: {fed}")
     return wiring

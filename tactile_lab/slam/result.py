@@ -8,6 +8,7 @@ from typing import Literal
 from gtsam import Pose3
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.doubt.status import Alternative, Doubt, Status
 from tactile_lab.slam.graph.pose_graph import LoopReport
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
@@ -58,8 +59,13 @@ class SlamResult:
         surface: the final field in the object frame, None if there was no usable grasp.
         contour: the final outline (dimension 2), object frame.
         mesh: the final surface (dimension 3), object frame.
-        status: "ok" or "lost".
+        status: how much of it may be believed, see :mod:`tactile_lab.slam.doubt.status`.
         warnings: failures that did not end the estimation.
+        known_share: share of the outline or surface that was touched, 0 to 1; None without a shape.
+        doubts: reasons to doubt the result.
+        common_covariances: of (x, y, yaw) in the object frame in which all grasps agree best, not in that of the first
+            grasp, which has an error too; empty for methods but "joint".
+        alternatives: other placings of grasps that the contacts allow, the most likely first.
     """
 
     method: str
@@ -72,8 +78,12 @@ class SlamResult:
     surface: Gpis | None
     contour: Contour | None
     mesh: SurfaceMesh | None
-    status: Literal["ok", "lost"]
+    status: Status
     warnings: tuple[str, ...] = ()
+    known_share: float | None = None
+    doubts: tuple[Doubt, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+    common_covariances: tuple[Array | None, ...] = ()
 
     @property
     def step_seconds(self) -> tuple[float, ...]:

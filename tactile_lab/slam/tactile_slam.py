@@ -34,6 +34,7 @@ from drivers.core.errors import TrackingError
 from drivers.core.observability import observability, planar_observability
 from drivers.core.one_thread import on_one_thread
 from tactile_lab.slam.current_shape import PresentShape, present_shape
+from tactile_lab.slam.doubt.assessment import assess
 from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.slam.graph.relocation import relocated_rows
 from tactile_lab.slam.result import SlamResult, SlamStep, Verdict
@@ -46,10 +47,10 @@ from tactile_lab.slam.tracking.contacts.first_pose import first_row
 from tactile_lab.slam.tracking.filter.particle_filter import CERTAIN_VARIANCE, PoseEstimate
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanism
+from tactile_lab.slam.tracking.tracker import Tracker
 from tactile_lab.slam.tracking.trackers import (
     GRAPH_METHODS,
     THESIS_METHODS,
-    Tracker,
     TrackingSettings,
     make_tracker,
     poses_to_be_told,
@@ -171,6 +172,14 @@ class TactileSlam:
             self._tracker.adopt(self._tracker.map.with_best_kernel(max_iterations=30, longest_m=0.300))
         wanted = self._settings
         shape = self.shape(wanted.contour_resolution_m if wanted.dimension == 2 else wanted.mesh_resolution_m)
+        told = assess(
+            self._tracker,
+            shape,
+            self._settings,
+            self._refused,
+            lost=self.is_lost,
+            origin_height_m=self._origin_height_m,
+        )
         return SlamResult(
             method=self._settings.method,
             seed=self._seed,
@@ -180,10 +189,14 @@ class TactileSlam:
             steps=tuple(self._steps),
             loops=self._back_end.reports,
             surface=self.surface,
-            contour=shape if isinstance(shape, Contour) else None,
-            mesh=shape if isinstance(shape, SurfaceMesh) else None,
-            status="lost" if self.is_lost else "ok",
+            contour=told.shape if isinstance(told.shape, Contour) else None,
+            mesh=told.shape if isinstance(told.shape, SurfaceMesh) else None,
+            status=told.status,
             warnings=self._warnings,
+            known_share=told.known_share,
+            doubts=told.doubts,
+            alternatives=told.alternatives,
+            common_covariances=self._common_covariances(),
         )
 
     @property
@@ -250,12 +263,17 @@ class TactileSlam:
     @property
     def is_lost(self) -> bool:
         """See the module's docstring; a session without an object frame is lost as well."""
+        refused = self._refused
+        recent = refused[-self._settings.lost_after :]
+        all_recent = len(recent) == self._settings.lost_after and all(recent)
+        return self._tracker is None or all_recent or 2 * sum(refused) > len(refused)
+
+    @property
+    def _refused(self) -> list[bool]:
+        """Of every grasp, whether it was untracked and still has no place."""
         placed = self._tracker.map.placed if self._tracker else ()
         later = [False] * (len(self._steps) - len(placed)) + [grasp.used for grasp in placed]
-        untracked = [step.verdict == "untracked" and not used for step, used in zip(self._steps, later, strict=True)]
-        recent = untracked[-self._settings.lost_after :]
-        all_recent = len(recent) == self._settings.lost_after and all(recent)
-        return self._tracker is None or all_recent or 2 * sum(untracked) > len(untracked)
+        return [step.verdict == "untracked" and not used for step, used in zip(self._steps, later, strict=True)]
 
     def _begin(self, grasp: Grasp, started: float) -> SlamStep:
         """Define the object frame: origin at the contacts' centre, x axis along the palm's (section 3.4)."""
@@ -316,6 +334,12 @@ class TactileSlam:
         return tuple(
             self._space.pose(grasp.row, self._origin_height_m) if grasp else None for grasp in self._placed_grasps()
         )
+
+    def _common_covariances(self) -> tuple[Array | None, ...]:
+        if not isinstance(self._tracker, JointTracker):
+            return ()
+        found = self._tracker.common_covariances
+        return (*[None] * (len(self._steps) - len(found)), *found)
 
     def _covariances(self) -> tuple[Array | None, ...]:
         return tuple(grasp.covariance if grasp else None for grasp in self._placed_grasps())

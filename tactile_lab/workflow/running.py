@@ -29,6 +29,7 @@ from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.workflow.attending import Attendance, roles_for, settings_for
 from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, finish
+from tactile_lab.workflow.plugging import RECORD, refused_plugins, used_plugins
 
 ALONE = Attendance()
 
@@ -160,6 +161,9 @@ def _record(
         roles = roles_for(attendance, runtime, slam, settings, session.folder, seed=seed, dimension=dimension)
         with roles.estimator:
             runtime.connect()
+            for refused in refused_plugins():
+                runtime.log(Level.WARNING, "plug-ins", refused)
+                progress.on_message(refused)
             record_camera(rig, session.recorder, runtime.clock.now_ns())
             try:
                 outcome = Conductor(runtime, settings, roles, progress).run()
@@ -188,6 +192,7 @@ def _new_session(
             **_policy(rig, request),
             "markers": laboratory.markers.model_dump(mode="json"),
             **({UNCALIBRATED: list(overlooked)} if overlooked else {}),
+            **_plugins(rig, slam, request),
         },
         notes=request.notes,
         truth_mesh_ply=None if laboratory.target is None else _ply(laboratory.target),
@@ -200,6 +205,13 @@ def _policy(rig: Rig, request: SessionRequest) -> dict[str, str]:
     """The policy by name, for the session's record."""
     policy = _conductor_settings(rig, request).exploration.policy
     return {} if policy is None else {"policy": policy}
+
+
+def _plugins(rig: Rig, slam: TactileSlam, request: SessionRequest) -> dict[str, Any]:
+    """The plug-ins that the session uses, for its record; nothing where it uses none."""
+    policy = _conductor_settings(rig, request).exploration.policy
+    used = used_plugins(rig.description, slam.settings, policy)
+    return {RECORD: used} if used else {}
 
 
 def _ply(target: ObjectModel) -> bytes:

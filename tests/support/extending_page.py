@@ -15,9 +15,9 @@ Written = Callable[..., Path]
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
 
 
-def code(file: str) -> str:
-    """The page's block of code that starts with the name of this file."""
-    blocks = re.findall(r"^```python\n(# (\S+)\n.*?)^```$", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+def code(file: str, page: Path = PAGE) -> str:
+    """A page's block of code that starts with the name of this file."""
+    blocks = re.findall(r"^```python\n(# (\S+)\n.*?)^```$", page.read_text(), re.MULTILINE | re.DOTALL)
     return next(text for text, name in blocks if name == file)
 
 

@@ -87,7 +87,7 @@ def test_planar_contacts_with_a_known_outline_are_imported_estimated_and_judged(
     answer = inside("reconstruct", log["log"], "--out", tmp_path / "out", "--seed", 1, "--json")
     assert answer.code == 0, answer.err
     judged = json.loads(answer.out)
-    assert (judged["object"], judged["status"]) == ("rectangle", "ok")
+    assert (judged["object"], judged["status"]) == ("rectangle", "complete")
     assert judged["truth"] == {"seen": 5, "missing": 0, "mesh": True}
     assert judged["shape_best_fit"]["hausdorff_mm"] < 10.0
     assert judged["pose"]["rmse_mm"] < 15.0

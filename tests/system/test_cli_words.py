@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 
 from drivers.core.errors import TactileLabError
 from tactile_lab.cli.app import app
-from tactile_lab.cli.options import Method
+from tactile_lab.cli.options import OUR_METHODS
 from tactile_lab.slam.shape.selection.models import SHAPE_MODELS
-from tactile_lab.slam.tactile_slam import SlamSettings
+from tactile_lab.slam.tracking.trackers import METHODS
 from tests.support.repository import REPOSITORY
 
 COMMANDS = (
@@ -121,8 +121,7 @@ def test_a_usage_error_names_the_option_and_exits_with_2(words, told, tmp_path, 
 
 
 def test_the_methods_on_offer_are_those_of_the_estimation():
-    schema = SlamSettings.model_json_schema()["properties"]["method"]
-    assert {method.value for method in Method} == set(schema["enum"])
+    assert METHODS.registered() == OUR_METHODS
 
 
 def test_the_shape_models_on_offer_are_those_there_are():

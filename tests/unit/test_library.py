@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
 
 import tactile_lab
+from tests.support import public_api
+from tests.support.repository import REPOSITORY
 
 SESSION = """
 import numpy as np
@@ -37,6 +43,40 @@ def test_contacts_become_a_contour_with_sigma_in_fifteen_lines_without_any_drive
     assert len([line for line in SESSION.splitlines() if line]) <= 15
 
 
-def test_everything_that_is_public_can_be_had() -> None:
-    for name in tactile_lab.__all__:
-        assert getattr(tactile_lab, name).__name__ == name
+def test_everything_that_is_public_can_be_had_and_stands_in_the_reference_as_it_is() -> None:
+    assert set(tactile_lab.__all__) == {*tactile_lab._PLACES, "__version__"}
+    assert set(tactile_lab.__all__) <= set(dir(tactile_lab))
+    assert public_api.PAGE.read_text() == public_api.page(), "run: python -m tests.support.public_api"
+
+
+def test_the_version_is_that_of_the_installation() -> None:
+    assert tactile_lab.__version__ == version("tactile-lab")
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = tactile_lab.nothing
+
+
+def test_every_package_says_that_it_is_typed() -> None:
+    packages = ("tactile_lab", "drivers", "calibration", "sessions")
+    assert all((REPOSITORY / package / "py.typed").is_file() for package in packages)
+
+
+@pytest.mark.parametrize("hiding", ["calibration.py", "sessions/__init__.py", "drivers/__init__.py"])
+def test_a_users_own_file_with_a_name_of_ours_is_named_in_one_sentence(tmp_path: Path, hiding: str) -> None:
+    file = tmp_path / hiding
+    file.parent.mkdir(exist_ok=True)
+    file.write_text("x = 1\n")
+    code = "import tactile_lab"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    package = hiding.partition("/")[0].removesuffix(".py")
+    wanted = f"ImportError: {file} hides the package '{package}' of tactile-lab: rename it, or start Python in another"
+    assert done.stderr.splitlines()[-1] == f"{wanted} folder"
+    words = [sys.executable, "-m", "tactile_lab", "--version"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (1, f"{wanted.replace('ImportError', 'error')} folder\n")
+
+
+def test_a_users_own_folder_of_recordings_does_no_harm(tmp_path: Path) -> None:
+    (tmp_path / "sessions" / "2026-01-01").mkdir(parents=True)
+    code = "import tactile_lab; print(tactile_lab.Session.__module__)"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == "sessions.recording.session", done.stderr

@@ -18,6 +18,8 @@ EXTRAS = {
     "fpdf": "hardware",
     "viser": "view",
     "h5py": "export",
+    "distributed": "cluster",
+    "pyarrow": "cluster",
     "rosbags": "ros",
     "pxr": "usd",
 }

@@ -13,11 +13,10 @@ import typer
 from tactile_lab.cli.completion import complete_object, complete_policy
 from tactile_lab.cli.options import (
     LARGEST_SEED,
-    METHOD_HELP,
     MOST_GRASPS,
     AllowUncalibrated,
     Json,
-    Method,
+    MethodName,
     NoInput,
     RigName,
 )
@@ -58,7 +57,7 @@ def run(
         typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps.", show_default="from the rig, 16 on sim"),
     ] = None,
     dimension: Annotated[int, typer.Option(min=2, max=3, help="2: estimate a horizontal contour; 3: a surface.")] = 2,
-    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
+    method: MethodName = "joint",
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of the session.")] = 0,
     out: Annotated[Path, typer.Option(help="Folder in which the session's folder is created.")] = Path("runs"),
     notes: Annotated[str, typer.Option(help="Notes to store with the session.")] = "",

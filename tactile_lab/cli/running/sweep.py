@@ -7,14 +7,25 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, METHOD_HELP, MOST_GRASPS, MOST_JOBS, Json, Method, NoInput, RigName
+from tactile_lab.cli.options import (
+    LARGEST_SEED,
+    MOST_GRASPS,
+    MOST_JOBS,
+    Json,
+    Merge,
+    MethodName,
+    NoInput,
+    ParquetFile,
+    RigName,
+    Scheduler,
+)
 
 
 def sweep(
     objects: Annotated[str, typer.Option(help="Comma-separated object names, or 'all'.")] = "all",
     seeds: Annotated[str, typer.Option(help="Comma-separated random seeds.")] = "1,2,3",
     dimensions: Annotated[str, typer.Option(help="Comma-separated dimensions: 2, 3 or 2,3.")] = "2,3",
-    method: Annotated[Method, typer.Option(help=METHOD_HELP)] = Method.JOINT,
+    method: MethodName = "joint",
     grasps: Annotated[int, typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps per session.")] = 16,
     rig: RigName = "sim",
     jobs: Annotated[int, typer.Option(min=1, max=MOST_JOBS, help="Number of parallel sessions.")] = 2,
@@ -23,6 +34,9 @@ def sweep(
         bool,
         typer.Option("--check-replay", help="Replay every session; a session whose replay differs counts as failed."),
     ] = False,
+    scheduler: Scheduler = "",
+    merge: Merge = None,
+    parquet: ParquetFile = None,
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -34,9 +48,10 @@ def sweep(
 
     from drivers.core.atomic_files import write_whole
     from tactile_lab.cli.console import answer, emit_json, say, show_table
-    from tactile_lab.cli.running.sweep_cells import LINES_FILE, cell_of, row_of, run_sweep_cell
+    from tactile_lab.cli.running.sweep_cells import cell_of, row_of, run_sweep_cell
     from tactile_lab.evaluation.sweep import markdown_table, planned_runs, summaries, summary_cells, summary_titles
-    from tactile_lab.experiments.runner import RunnerSettings, run_cells
+    from tactile_lab.experiments.parquet import write_parquet
+    from tactile_lab.experiments.runner import LINES_FILE, RunnerSettings, run_cells
     from tactile_lab.workflow.sweeping import check_sweep
 
     del no_input
@@ -44,11 +59,14 @@ def sweep(
     chosen = _numbers(dimensions, "--dimensions", smallest=2, largest=3)
     drawn = _numbers(seeds, "--seeds", largest=LARGEST_SEED)
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
-    cells = [cell_of(run, rig, str(method), grasps, check_replay) for run in runs]
-    work = partial(run_sweep_cell, root=out)
-    done = run_cells(
-        "sweep", cells, work, out / LINES_FILE, RunnerSettings(jobs), lambda row, *_: say(row_of(row).line())
-    )
+    cells = [cell_of(run, rig, method, grasps, check_replay) for run in runs]
+    folder = out.resolve()  # for workers, which stand elsewhere
+    others = tuple(each / LINES_FILE for each in merge or ())
+    settings = RunnerSettings(jobs, scheduler=scheduler, shared=folder, others=others)
+    work = partial(run_sweep_cell, root=folder if scheduler else out)
+    done = run_cells("sweep", cells, work, out / LINES_FILE, settings, lambda row, *_: say(row_of(row).line()))
+    if parquet is not None:
+        write_parquet(parquet, "sweep", done)
     rows = [row_of(row) for row in done]
     found = summaries(rows)
     if as_json:

@@ -9,8 +9,6 @@ from tactile_lab.evaluation.sweep import SweepRow, SweepRun
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.workflow.sweeping import run_for_sweep
 
-LINES_FILE = "runs.jsonl"
-
 
 def cell_of(run: SweepRun, rig: str, method: str, grasps: int, check_replay: bool) -> Cell:
     """All that a run depends on, so that a sweep with other settings takes none of another's results."""

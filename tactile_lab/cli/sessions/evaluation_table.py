@@ -89,10 +89,15 @@ def _rest(content: Mapping[str, Any]) -> Table:
         grid.add_row("Loops", _figure(loops.get("accepted"), "  ", 0), wrong)
     grid.add_row("True poses", _figure(truth.get("seen"), "  ", 0), seen)
     grid.add_row("Time per step, median", _figure(time.get("step_ms_median"), "ms", 0), spread)
-    grid.add_row("Tracking", f"{content.get('status', UNKNOWN)}   ", "")
+    grid.add_row("Status", f"{content.get('status', UNKNOWN)}   ", _touched(content))
     for name, value in (content.get("further") or {}).items():
         grid.add_row(name, f"{further_text(value)}   ", "")
     return grid
+
+
+def _touched(content: Mapping[str, Any]) -> str:
+    share = content.get("known_share")
+    return "" if share is None else f"{share:.0%} of the shape was touched"
 
 
 def _verdict(content: Mapping[str, Any]) -> Text:

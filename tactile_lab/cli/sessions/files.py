@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -50,6 +51,12 @@ def export(
         typer.Option(help="Write the estimated and the true trajectory to this new folder, in TUM's text format."),
     ] = None,
     archive: Annotated[Path | None, typer.Option(help="Write the whole session to this new ZIP file.")] = None,
+    other: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--as", metavar="NAME=PLACE", help="Write it by an exporter of an extension or plug-in. Can be repeated."
+        ),
+    ] = None,
     root: Root = Path("runs"),
     dimension: Annotated[
         int | None,
@@ -64,13 +71,15 @@ def export(
     from drivers.core.atomic_files import refuse_existing
     from tactile_lab.cli.console import answer, count, emit_json, say
     from tactile_lab.workflow import exporting
+    from tactile_lab.workflow.exporters import export_as
 
     del no_input
     kinds = {"csv": csv, "hdf5": hdf5, "rosbag": rosbag, "tum": tum, "archive": archive}
+    others = _places(other or ())
     places = [place for place in (contacts, *kinds.values()) if place is not None]
-    if not places:
-        raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --tum, --archive")
-    refuse_existing(places)
+    if not places and not others:
+        raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --tum, --archive, --as")
+    refuse_existing([*places, *(place for _, place in others)])
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
@@ -83,8 +92,28 @@ def export(
             written = exporting.EXPORTS[kind](found, place)
             told |= {kind: str(place), f"{kind}_written": written}
             answer(f"{written} {exporting.UNITS[kind]}: {place}")
+    for name, place in others:
+        words = export_as(name, found, place)
+        told |= {name: str(place), f"{name}_written": words}
+        answer(f"{words}: {place}")
     if as_json:
         emit_json(told)
+
+
+def _places(named: Sequence[str]) -> list[tuple[str, Path]]:
+    """Exporters and where they write. Raises ConfigurationError for unknown ones, BadParameter for other text."""
+    if not named:
+        return []
+    from tactile_lab.workflow.exporters import EXPORTERS
+
+    found = []
+    for text in named:
+        name, equals, place = text.partition("=")
+        if not equals or not place:
+            raise typer.BadParameter(f"{text!r} is not NAME=PLACE, as in --as npz=session.npz")
+        EXPORTERS[name]  # an unknown or broken one is told before anything is read
+        found.append((name, Path(place)))
+    return found
 
 
 def bring_in(

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tactile_lab.cli.completion import complete_session, complete_shape
-from tactile_lab.cli.options import LARGEST_SEED, LAST, METHOD_HELP, SHAPE_HELP, Json, Method, NoInput, Root
+from tactile_lab.cli.options import LARGEST_SEED, LAST, SHAPE_HELP, Json, NoInput, OtherMethod, Root
 from tactile_lab.cli.sessions.choosing import resolve_name
 
 
@@ -21,7 +21,7 @@ def reconstruct(
             autocompletion=complete_session,
         ),
     ],
-    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="joint, or from the session")] = None,
+    method: OtherMethod = None,
     shape: Annotated[
         str | None, typer.Option(metavar="MODEL", help=SHAPE_HELP, show_default="auto", autocompletion=complete_shape)
     ] = None,
@@ -64,7 +64,7 @@ def reconstruct(
 
     del no_input
     wishes = Wishes(
-        None if method is None else method.value,
+        method,
         dimension,
         seed,
         settings,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, METHOD_HELP, Json, Method, NoInput, Root, SessionName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, OtherMethod, Root, SessionName
 from tactile_lab.cli.sessions import files as session_files
 from tactile_lab.cli.sessions import slips as session_slips
 from tactile_lab.cli.sessions.choosing import choose_session, resolve_name
@@ -61,7 +61,7 @@ def replay(
     into: Annotated[
         Path | None, typer.Option(help="Folder for the new results.", show_default="SESSION/replay")
     ] = None,
-    method: Annotated[Method | None, typer.Option(help=METHOD_HELP, show_default="from the session")] = None,
+    method: OtherMethod = None,
     dimension: Annotated[
         int | None, typer.Option(min=2, max=3, help="Dimension: 2 or 3.", show_default="from the session")
     ] = None,
@@ -135,6 +135,7 @@ def _tell_identity(recorded: Session, out: Path) -> bool:
     from sessions.recording.manifest import installed_versions
     from tactile_lab.cli.console import answer, warn
     from tactile_lab.workflow.finishing import differing_files
+    from tactile_lab.workflow.plugging import changed_plugins
 
     differing = differing_files(recorded.results, out)
     if not differing:
@@ -144,6 +145,7 @@ def _tell_identity(recorded: Session, out: Path) -> bool:
     changed = [
         f"{name} {then.get(name)} then, {number} now" for name, number in now.items() if then.get(name) != number
     ]
+    changed += changed_plugins(recorded)
     reason = f" ({'; '.join(changed)})" if changed else ""
     warn(f"differs from the recorded results: {', '.join(differing)}{reason}")
     return False

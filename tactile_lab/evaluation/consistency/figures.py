@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gtsam import Pose3
 
+from drivers.core.contacts import Array
 from drivers.core.poses import planar
 from tactile_lab.evaluation.consistency.levels import CURVE, LEVELS
+from tactile_lab.evaluation.consistency.pose_covariance import covariance_in_world
 from tactile_lab.evaluation.consistency.poses import PoseConsistency, birth_frame, common_frame, pose_consistency
 from tactile_lab.evaluation.consistency.surfaces import SurfaceConsistency, mesh_consistency, outline_consistency
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, true_outline
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
+from tactile_lab.evaluation.files.results import Results
 from tactile_lab.evaluation.files.tables import read_contour
-from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry
 
 
 @dataclass(frozen=True)
@@ -63,17 +64,23 @@ class ConsistencyFigures:
 def consistency(estimate: EstimateWithTruth) -> ConsistencyFigures | None:
     """Judge poses and surface; None if the truth is known of neither. Turns of symmetry do not count."""
     truth = estimate.truth.world_T_object
-    told = modulo_symmetry(estimate.poses, truth, estimate.symmetry_turns)
-    covariances = estimate.results.trajectory.covariances
-
-    def judged(frame: Pose3 | None) -> PoseFigures | None:
-        return PoseFigures.of(pose_consistency(told, covariances, truth, frame))
-
-    born, common = judged(birth_frame(told, truth)), judged(common_frame(told, truth))
+    told, covariances = estimate.poses_modulo_symmetry, estimate.results.trajectory.covariances
+    in_common = common_covariances(estimate.results) or covariances
+    born = PoseFigures.of(pose_consistency(told, covariances, truth, birth_frame(told, truth)))
+    common = PoseFigures.of(pose_consistency(told, in_common, truth, common_frame(told, truth)))
     surface = _surface(estimate)
     if born is None and common is None and surface is None:
         return None
     return ConsistencyFigures(LEVELS, CURVE, born, common, surface)
+
+
+def common_covariances(results: Results) -> tuple[Array | None, ...]:
+    """Covariances of the poses in the best common object frame, shape (6, 6); empty in results without them."""
+    stated = results.slam.get("common_covariances") or ()
+    return tuple(
+        None if pose is None or covariance is None else covariance_in_world(pose, np.array(covariance, dtype=float))
+        for pose, covariance in zip(results.trajectory.world_T_object, stated, strict=False)
+    )
 
 
 def _surface(estimate: EstimateWithTruth) -> SurfaceConsistency | None:
@@ -81,9 +88,9 @@ def _surface(estimate: EstimateWithTruth) -> SurfaceConsistency | None:
     if compared is None:
         return None
     if estimate.results.dimension == 3:
-        mesh, sigma_m = read_estimated_mesh(estimate.folder / "mesh.ply")
+        found = read_estimated_mesh(estimate.folder / "mesh.ply")
         assert estimate.truth.mesh is not None
-        return mesh_consistency(mesh, sigma_m, estimate.truth.mesh, compared.truth_T_fitted)
+        return mesh_consistency(found.mesh, found.sigma_m, estimate.truth.mesh, compared.truth_T_fitted)
     outline, truth_m = read_contour(estimate.folder / "contour.csv"), true_outline(estimate.results, estimate.truth)
     if truth_m is None or not len(outline.sigma_m):
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
+from tactile_lab.colours import UNKNOWN
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 SMALLEST_EXTENT_m, LARGEST_EXTENT_m = 0.005, 1.0
@@ -23,6 +25,9 @@ COLOUR_RANGE_m = 0.010
 
 _COLOURS = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (253, 231, 37)], dtype=float)
 """Viridis, dark (certain) to bright (uncertain)."""
+
+
+_GUESS = np.append(UNKNOWN, 255.0)
 
 
 def read_mesh(path: Path | str) -> trimesh.Trimesh:
@@ -50,8 +55,23 @@ def read_mesh(path: Path | str) -> trimesh.Trimesh:
     return mesh
 
 
-def read_estimated_mesh(path: Path | str) -> tuple[trimesh.Trimesh, Array]:
-    """An estimated surface of this program, metres, and its standard deviation at each vertex, shape (n,).
+@dataclass(frozen=True)
+class EstimatedMesh:
+    """An estimated surface as read from its file, metres.
+
+    Attributes:
+        mesh: closed.
+        sigma_m: standard deviation at each vertex, shape (n,).
+        known: of each vertex, whether it was touched nearby, shape (n,); always so in a file that does not say it.
+    """
+
+    mesh: trimesh.Trimesh
+    sigma_m: Array
+    known: NDArray[np.bool_]
+
+
+def read_estimated_mesh(path: Path | str) -> EstimatedMesh:
+    """Read an estimated surface of this program.
 
     Raises:
         ShapeError: as :func:`read_mesh`, or a mesh without standard deviations.
@@ -63,7 +83,10 @@ def read_estimated_mesh(path: Path | str) -> tuple[trimesh.Trimesh, Array]:
             "contains no standard deviations", where=str(path), hint="Replay the session to renew its results"
         )
     _, nearest = cKDTree(np.column_stack([written[axis] for axis in "xyz"])).query(mesh.vertices)
-    return mesh, np.asarray(written["sigma_m"], dtype=float)[nearest]
+    known = written["known"] if "known" in written.dtype.names else np.ones(len(written))
+    return EstimatedMesh(
+        mesh, np.asarray(written["sigma_m"], dtype=float)[nearest], np.asarray(known, dtype=bool)[nearest]
+    )
 
 
 def sigma_colours(sigma_m: Array) -> NDArray[np.uint8]:
@@ -75,14 +98,16 @@ def sigma_colours(sigma_m: Array) -> NDArray[np.uint8]:
 
 
 def write_ply(path: Path | str, mesh: SurfaceMesh) -> None:
-    """Write a binary PLY with normals, colours and the vertex property ``sigma_m``; equal meshes give equal bytes.
+    """Write a binary PLY with normals, colours and the vertex properties ``sigma_m`` and ``known`` (0: a guess).
+
+    Equal meshes give equal bytes.
 
     Raises:
         WriteError: the file cannot be written.
     """
     vertex_type = [(name, "<f8") for name in ("x", "y", "z")] + [(name, "<f4") for name in ("nx", "ny", "nz")]
-    vertex_type += [(name, "u1") for name in ("red", "green", "blue", "alpha")] + [("sigma_m", "<f4")]
-    columns = np.column_stack([mesh.vertices, mesh.normals, sigma_colours(mesh.sigma_m), mesh.sigma_m])
+    vertex_type += [(name, "u1") for name in ("red", "green", "blue", "alpha")] + [("sigma_m", "<f4"), ("known", "u1")]
+    columns = np.column_stack([mesh.vertices, mesh.normals, _colours(mesh), mesh.sigma_m, _known(mesh)])
     vertices = np.empty(len(columns), dtype=vertex_type)
     for (name, _), column in zip(vertex_type, columns.T, strict=True):
         vertices[name] = column
@@ -92,7 +117,9 @@ def write_ply(path: Path | str, mesh: SurfaceMesh) -> None:
 
 
 def write_glb(path: Path | str, mesh: SurfaceMesh) -> None:
-    """Write a binary glTF with normals and colours by standard deviation; equal meshes give equal bytes.
+    """Write a binary glTF with normals and colours by standard deviation, grey where it is a guess.
+
+    Equal meshes give equal bytes.
 
     Raises:
         WriteError: the file cannot be written.
@@ -101,11 +128,20 @@ def write_glb(path: Path | str, mesh: SurfaceMesh) -> None:
         mesh.vertices,
         mesh.faces,
         vertex_normals=mesh.normals,
-        vertex_colors=sigma_colours(mesh.sigma_m),
+        vertex_colors=_colours(mesh),
         process=False,
     )
     scene = trimesh.Scene(surface)
     write_whole(Path(path), scene.export(file_type="glb", include_normals=True))  # type: ignore[no-untyped-call]
+
+
+def _known(mesh: SurfaceMesh) -> NDArray[np.bool_]:
+    return np.ones(len(mesh.vertices), dtype=bool) if mesh.known is None else mesh.known
+
+
+def _colours(mesh: SurfaceMesh) -> NDArray[np.uint8]:
+    """Colours by standard deviation, grey where the surface is a guess, shape (n, 4), RGBA."""
+    return np.where(_known(mesh)[:, None], sigma_colours(mesh.sigma_m), _GUESS).astype(np.uint8)
 
 
 def _load(path: Path) -> trimesh.Trimesh:

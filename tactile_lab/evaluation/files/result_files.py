@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array, Grasp
@@ -62,7 +63,7 @@ def write_results(
     texts = {
         "trajectory.csv": trajectory_text(trajectory),
         "contacts.csv": contacts_text(grasps),
-        **({} if result.contour is None else {"contour.csv": contour_text(*_ring_with_sigma(result.contour))}),
+        **({} if result.contour is None else {"contour.csv": _contour_text(result.contour)}),
         **_known_contour(result, largest_sigma_m),
         "slam.json": json_text(_slam_record(result, settings or {})),
         "timing.json": json_text({"schema_version": SCHEMA_VERSION, "step_seconds": result.step_seconds}),
@@ -106,18 +107,24 @@ def upright_contour(result: SlamResult, grasps: Sequence[Grasp]) -> SurfaceMesh 
     placed = next((pose for pose in result.world_T_object if pose is not None), None)
     if result.contour is None or placed is None or not heights.size or heights.max() < _LEAST_HEIGHT_m:
         return None
-    ring, sigma_m = _ring_with_sigma(result.contour)
+    ring, nearest = _ring_of(result.contour)
+    sigma_m, known = result.contour.sigma_m[nearest], result.contour.known
     origin_m = float(placed.z())
     vertices, faces = prism(ring, -origin_m, float(heights.max()) - origin_m)
     normals = _vertex_normals(vertices, faces)
-    return SurfaceMesh(vertices, faces, np.tile(sigma_m, 2), normals, result.contour.is_closed)
+    touched = None if known is None else np.tile(known[nearest], 2)
+    return SurfaceMesh(vertices, faces, np.tile(sigma_m, 2), normals, result.contour.is_closed, touched)
 
 
-def _ring_with_sigma(contour: Contour) -> tuple[Array, Array]:
-    """The contour as in ``contour.csv``, with the standard deviation at each point."""
+def _ring_of(contour: Contour) -> tuple[Array, NDArray[np.intp]]:
+    """The contour as in ``contour.csv``, and the index of the contour's point at each of its points."""
     ring = open_ring(contour.points_m)
-    nearest = np.argmin(np.sum((ring[:, None] - contour.points_m[None]) ** 2, axis=2), axis=1)
-    return ring, contour.sigma_m[nearest]
+    return ring, np.argmin(np.sum((ring[:, None] - contour.points_m[None]) ** 2, axis=2), axis=1)
+
+
+def _contour_text(contour: Contour) -> str:
+    ring, nearest = _ring_of(contour)
+    return contour_text(ring, contour.sigma_m[nearest], None if contour.known is None else contour.known[nearest])
 
 
 def _vertex_normals(vertices: Array, faces: Triangles) -> Array:
@@ -136,10 +143,14 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "seed": result.seed,
         "dimension": result.dimension,
         "status": result.status,
+        "known_share": result.known_share,
+        "doubts": result.doubts,
+        "alternatives": result.alternatives,
         **({"warnings": result.warnings} if result.warnings else {}),
         "settings": settings,
         "steps": [_without_duration(step) for step in result.steps],
         "covariances": result.covariances,
+        "common_covariances": result.common_covariances,
         "loops": result.loops,
         "sigma_quantiles_m": _sigma_quantiles(result),
     }

@@ -32,6 +32,20 @@ class Results:
         return None if quantiles is None else np.array(quantiles, dtype=float)
 
     @property
+    def status(self) -> str:
+        """How much may be believed, see :mod:`tactile_lab.slam.doubt.status`; what older files call "ok" is "complete",
+        without a known share.
+        """
+        status = str(self.slam["status"])
+        return "complete" if status == "ok" else status
+
+    @property
+    def known_share(self) -> float | None:
+        """Share of the outline or surface that was touched; None if unknown."""
+        share = self.slam.get("known_share")
+        return None if share is None else float(share)
+
+    @property
     def dimension(self) -> int:
         """2: a horizontal contour; 3: a surface."""
         return int(self.slam["dimension"])

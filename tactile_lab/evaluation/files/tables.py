@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import ConfigurationError, SessionError
@@ -19,7 +20,7 @@ CONTACT_COLUMNS = (
     *("grasp", "stamp_s", "finger", "x_world_m", "y_world_m", "z_world_m"),
     *("normal_x_world", "normal_y_world", "normal_z_world", "point_sigma_m", "normal_sigma_rad", "force_N"),
 )
-CONTOUR_COLUMNS = ("x_m", "y_m", "sigma_m")
+CONTOUR_COLUMNS = ("x_m", "y_m", "sigma_m", "known")
 _LEAST_CORNERS = 3
 RERUN = "Replay the session to write its results"
 
@@ -92,12 +93,16 @@ def _contact_rows(rows: list[list[str]]) -> ContactRows:
     return ContactRows(tuple(row[0] for row in rows), table[:, :3], table[:, 3:6], *table[:, 6:].T)
 
 
-def contour_text(ring_m: Array, sigma_m: Array) -> str:
+def contour_text(ring_m: Array, sigma_m: Array, known: NDArray[np.bool_] | None = None) -> str:
     """``contour.csv`` of a closed contour of shape (n, 2), object frame, and its standard deviations, shape (n,).
 
-    The first point is repeated at the end.
+    The first point is repeated at the end. ``known`` says of each point whether it was touched nearby; None: all were.
     """
-    rows = [[repr(float(value)) for value in (*point, sigma)] for point, sigma in zip(ring_m, sigma_m, strict=True)]
+    touched = np.ones(len(ring_m), dtype=bool) if known is None else known
+    rows = [
+        [*(repr(float(value)) for value in (*point, sigma)), str(int(near))]
+        for point, sigma, near in zip(ring_m, sigma_m, touched, strict=True)
+    ]
     return _csv_text(CONTOUR_COLUMNS, [*rows, rows[0]])
 
 
@@ -114,10 +119,12 @@ class ContourRows:
     Attributes:
         points_m: shape (n, 2).
         sigma_m: standard deviation along the normal, shape (n,); of shape (0,) in results of older versions.
+        known: whether it was touched nearby, shape (n,); always so in results of older versions.
     """
 
     points_m: Array
     sigma_m: Array
+    known: NDArray[np.bool_]
 
 
 def read_contour(path: Path) -> ContourRows:
@@ -126,14 +133,15 @@ def read_contour(path: Path) -> ContourRows:
     Raises:
         SessionError: the file is missing or not in the format of :func:`contour_text`.
     """
-    rows = _read_csv(path, CONTOUR_COLUMNS, CONTOUR_COLUMNS[:2])
+    rows = _read_csv(path, CONTOUR_COLUMNS, CONTOUR_COLUMNS[:3], CONTOUR_COLUMNS[:2])
     try:
         table = np.array([[float(entry) for entry in row] for row in rows[:-1]])
     except ValueError as error:
         raise SessionError(f"has an entry that is not a number ({error})", where=str(path), hint=RERUN) from error
     if len(table) < _LEAST_CORNERS or not np.isfinite(table).all():
         raise SessionError("is not an outline of three finite points or more", where=str(path), hint=RERUN)
-    return ContourRows(table[:, :2], table[:, 2:].ravel())
+    known = table[:, 3] != 0 if table.shape[1] > 3 else np.ones(len(table), dtype=bool)
+    return ContourRows(table[:, :2], table[:, 2:3].ravel(), known)
 
 
 def _read_csv(path: Path, *forms: Sequence[str]) -> list[list[str]]:

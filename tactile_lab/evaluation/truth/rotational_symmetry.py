@@ -12,11 +12,15 @@ import numpy as np
 import trimesh
 from gtsam import Pose3, Rot3
 
+from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 from tactile_lab.evaluation.trajectory import Poses
+from tactile_lab.slam.doubt.symmetry import ROUND, Symmetry, symmetry_of
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh
+from tactile_lab.slam.shape.surfaces.surface import Contour
 
-ANY_TURN = 0
+ANY_TURN = ROUND
+ORIGIN_m = np.zeros(2)
 
 _FEWEST = 6
 _MOST = 12
@@ -46,7 +50,15 @@ def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
     return next((number for number in range(_MOST, _FEWEST - 1, -1) if stays(2 * np.pi / number)), None)
 
 
-def modulo_symmetry(estimate: Poses, world_T_object: Poses, turns: int | None) -> tuple[Pose3 | None, ...]:
+def outline_symmetry(outline_m: Array) -> Symmetry | None:
+    """The same for an outline in the plane, shape (n, 2), with its axis; None if its rotations can be distinguished."""
+    found = symmetry_of(Contour(outline_m, np.zeros(len(outline_m)), is_closed=True))
+    return found if found is not None and found.interchangeable else None
+
+
+def modulo_symmetry(
+    estimate: Poses, world_T_object: Poses, turns: int | None, centre_m: Array = ORIGIN_m
+) -> tuple[Pose3 | None, ...]:
     """Estimated poses, rotated about the object's axis towards the true heading.
 
     The axis in the estimated object frame is the true axis as placed by the estimates, averaged over all grasps. Poses
@@ -56,12 +68,13 @@ def modulo_symmetry(estimate: Poses, world_T_object: Poses, turns: int | None) -
         estimate: estimated poses, None if unknown.
         world_T_object: true poses, None if unknown.
         turns: see :func:`symmetry_turns`; None leaves the poses unchanged.
+        centre_m: where the axis is in the true object frame, shape (2,).
     """
     known = zip(estimate, world_T_object, strict=True)
     pairs = [(pose, truth) for pose, truth in known if pose is not None and truth is not None]
     if turns is None or not pairs or not all(stands(truth) for _, truth in pairs):
         return tuple(estimate)
-    axis_m = np.mean([pose.transformTo(truth.translation()) for pose, truth in pairs], axis=0)
+    axis_m = np.mean([pose.transformTo(truth.transformFrom(np.append(centre_m, 0.0))) for pose, truth in pairs], axis=0)
     heading = pairs[0][1].rotation().inverse() * pairs[0][0].rotation()
     turned = []
     for pose, truth in zip(estimate, world_T_object, strict=True):

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from drivers.core.atomic_files import write_whole
+from tactile_lab.experiments.execution.source_version import version
 from tactile_lab.experiments.plots import draw
 from tactile_lab.experiments.results.overview import overview
 from tactile_lab.experiments.results.pages import merge_plots, page
 from tactile_lab.experiments.results.stored_result import StoredResult
 from tactile_lab.experiments.results.storing import DATA, NOTES, PICTURES, RESULTS
-from tactile_lab.experiments.runner import version
 
 MARK = "<!-- `make results` writes this page from data/{name}.json and notes/{name}.md. -->\n"
 

@@ -59,7 +59,7 @@ def _by_pose(name: str, gain: Gain) -> Callable[[], Policy]:
     return lambda: PoseSwitchPolicy(name, gain, _variance())
 
 
-POLICIES: Registry[Callable[[], Policy]] = Registry("policy", "policies")
+POLICIES: Registry[Callable[[], Policy]] = Registry("policy", "policies", group="policies")
 """Constructors of the policies, by name. See ``docs/extending.md`` for adding one."""
 
 POLICIES.register("random", RandomPolicy)

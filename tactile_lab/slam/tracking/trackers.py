@@ -1,24 +1,25 @@
-"""The trackers behind one interface, and their settings."""
+"""The trackers by name, and their settings."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal, Protocol, Self, TypeAlias
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self, TypeAlias
 
 import numpy as np
 from gtsam import Pose3
+from pydantic import AfterValidator, model_validator
 from pydantic import Field as Limit
-from pydantic import model_validator
 
 from drivers.core.configuration import StrictModel
-from drivers.core.contacts import Array, StepSigma
 from drivers.core.errors import ConfigurationError
+from drivers.core.registry import Registry
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
 from tactile_lab.slam.shape.fields.settings import GpisSettings
+from tactile_lab.slam.tracking.added_tracker import AddedTracker
 from tactile_lab.slam.tracking.baselines.icp_tracker import IcpSettings, IcpTracker
 from tactile_lab.slam.tracking.baselines.odometry_tracker import KnownPoseTracker, OdometryTracker
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 from tactile_lab.slam.tracking.contacts.spatial_pose_vectors import SPATIAL
@@ -29,60 +30,49 @@ from tactile_lab.slam.tracking.filter.measurement import (
     Measurement,
     ThesisMeasurement,
 )
-from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 from tactile_lab.slam.tracking.filter.particle_tracker import ParticleTracker
 from tactile_lab.slam.tracking.joint.deferred_association import Relocate
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.settings import JointSettings
+from tactile_lab.slam.tracking.tracker import Tracker
 
 GRID_MARGIN_m = 0.040
 
-Method: TypeAlias = Literal["joint", "particle", "thesis-pf", "thesis-pf-graph", "known-pose", "odometry", "icp"]
-"""The tracking methods, by the names in settings, command line and tables; see TrackingSettings."""
-
-THESIS_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph")
-PLANAR_METHODS: tuple[Method, ...] = ("thesis-pf", "thesis-pf-graph", "particle")
-GRAPH_METHODS: tuple[Method, ...] = ("particle", "thesis-pf-graph")
+THESIS_METHODS: tuple[str, ...] = ("thesis-pf", "thesis-pf-graph")
+PLANAR_METHODS: tuple[str, ...] = ("thesis-pf", "thesis-pf-graph", "particle")
+GRAPH_METHODS: tuple[str, ...] = ("particle", "thesis-pf-graph")
 """Methods whose poses the pose graph corrects."""
 
 THESIS_SHAPE = GpisSettings(observations="offsurface", kernel="thin_plate", prior_mean="zero")
 """The shape model of section 2.2, with that one of its two kernels that suits its filter better (decision 50)."""
 
 
-class Tracker(Protocol):
-    """Follows the object from grasp to grasp; the calls of one step come in this order."""
+@dataclass(frozen=True)
+class TrackerStart:
+    """What a tracker starts with.
 
-    effective_count: float
-    """Effective number of particles or hypotheses after the last weighting."""
+    Attributes:
+        map: the grasp that defines the object frame, with the shape model of the settings.
+        rng: source of all random numbers.
+        known_poses: true ``world_T_object`` of all grasps that follow, for methods that are told.
+        relocate: proposes poses anywhere on the object; None where it cannot.
+    """
 
-    @property
-    def map(self) -> ContactMap:
-        """All grasps so far with their present poses."""
+    map: ContactMap
+    rng: np.random.Generator
+    known_poses: Sequence[Pose3 | None] = ()
+    relocate: Relocate | None = None
 
-    @property
-    def refined(self) -> ContactMap:
-        """The same with refinements that take too long for every step, for the shape shown between grasps."""
 
-    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
-        """Move the belief by the hand's motion (eq. 3.7), known as well as ``measured`` says."""
+MakeTracker: TypeAlias = Callable[["TrackingSettings", TrackerStart], Tracker]
+"""Makes a method's tracker, started at the first grasp."""
 
-    def weigh(self, contacts: ContactSet) -> bool:
-        """Weight the belief by a grasp's contacts in the world (eq. 3.6); returns False if nothing fits."""
 
-    def estimate(self) -> PoseEstimate:
-        """The present pose."""
+METHODS: Registry[MakeTracker] = Registry("method", group="methods")
+"""Constructors of the trackers, by the names in settings, command line and tables. See ``docs/plugins.md``."""
 
-    def update_shape(self, contacts: ContactSet, certain: bool) -> None:
-        """Add the grasp to the map. A tracker with one hypothesis keeps uncertain contacts out of the shape."""
-
-    def resample(self) -> None:
-        """Concentrate the belief on likely states."""
-
-    def adopt(self, corrected: ContactMap) -> None:
-        """Take over a map whose poses were corrected from outside."""
-
-    def finish(self) -> None:
-        """No further grasp follows: final estimation from all of them."""
+Method: TypeAlias = Annotated[str, AfterValidator(METHODS.known)]
+"""The name of a registered method, for settings."""
 
 
 class TrackingSettings(StrictModel):
@@ -158,23 +148,19 @@ def make_tracker(
         rng: source of all random numbers.
         known_poses: for "known-pose": true ``world_T_object`` of the first grasp and of all that follow.
         relocate: for "joint": proposes poses anywhere on the object.
+
+    Raises:
+        EstimationError: a method of an extension or a plug-in raises; names its file.
     """
     shape = settings.shape or (THESIS_SHAPE if settings.method in THESIS_METHODS else GpisSettings())
-    start = ContactMap((first,), shape, settings.space)
-    match settings.method:
-        case "joint":
-            return JointTracker(start, settings.motion, settings.joint, settings.kernel_every, relocate)
-        case "odometry":
-            return OdometryTracker(start, settings.motion)
-        case "icp":
-            return IcpTracker(start, settings.motion, settings.icp)
-        case "known-pose":
-            return KnownPoseTracker(start, settings.motion, known_poses or ())
-        case _:
-            return _particle_tracker(settings, start, rng)
+    start = TrackerStart(ContactMap((first,), shape, settings.space), rng, known_poses or (), relocate)
+    make = METHODS[settings.method]
+    if settings.method in OUR_METHODS:
+        return make(settings, start)
+    return AddedTracker(settings.method, METHODS.file(settings.method), lambda: make(settings, start))
 
 
-def poses_to_be_told(method: Method, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
+def poses_to_be_told(method: str, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
     """Check that only the method that needs true poses gets them.
 
     Raises:
@@ -188,7 +174,7 @@ def poses_to_be_told(method: Method, poses: Sequence[Pose3 | None] | None) -> tu
     return None if poses is None else tuple(poses)
 
 
-def _particle_tracker(settings: TrackingSettings, start: ContactMap, rng: np.random.Generator) -> ParticleTracker:
+def _particle(settings: TrackingSettings, start: TrackerStart) -> Tracker:
     calibrated = settings.method not in THESIS_METHODS
     spacing_m = settings.contour_grid_m if settings.dimension == 2 else settings.surface_grid_m
 
@@ -199,15 +185,43 @@ def _particle_tracker(settings: TrackingSettings, start: ContactMap, rng: np.ran
             fitted, margin_m=GRID_MARGIN_m, spacing_m=spacing_m, gradient=calibrated, variance=calibrated
         )
 
-    measurement: Measurement = ThesisMeasurement(settings.gate, start.settings.offsurface_distance_m)
+    measurement: Measurement = ThesisMeasurement(settings.gate, start.map.settings.offsurface_distance_m)
     if calibrated:
         measurement = CalibratedMeasurement(settings.likelihood)
     return ParticleTracker(
-        first=start,
+        first=start.map,
         measurement=measurement,
         noise=settings.motion,
         particles=settings.particles,
         kernel_every=settings.kernel_every,
         field_of=field_of,
-        rng=rng,
+        rng=start.rng,
     )
+
+
+def _joint(settings: TrackingSettings, start: TrackerStart) -> Tracker:
+    return JointTracker(start.map, settings.motion, settings.joint, settings.kernel_every, start.relocate)
+
+
+def _odometry(settings: TrackingSettings, start: TrackerStart) -> Tracker:
+    return OdometryTracker(start.map, settings.motion)
+
+
+def _icp(settings: TrackingSettings, start: TrackerStart) -> Tracker:
+    return IcpTracker(start.map, settings.motion, settings.icp)
+
+
+def _known_pose(settings: TrackingSettings, start: TrackerStart) -> Tracker:
+    return KnownPoseTracker(start.map, settings.motion, start.known_poses)
+
+
+METHODS.register("joint", _joint)
+METHODS.register("particle", _particle)
+METHODS.register("thesis-pf", _particle)
+METHODS.register("thesis-pf-graph", _particle)
+METHODS.register("known-pose", _known_pose)
+METHODS.register("odometry", _odometry)
+METHODS.register("icp", _icp)
+
+OUR_METHODS = frozenset(METHODS.registered())
+"""Those that need no guarding."""

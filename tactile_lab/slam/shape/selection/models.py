@@ -93,7 +93,7 @@ def _normal_sigma(gpis: Gpis) -> Array:
     return seen if len(seen) else np.full(len(gpis.contacts_m), _GRADIENT_SIGMA)
 
 
-SHAPE_MODELS: Registry[Fit] = Registry("shape model")
+SHAPE_MODELS: Registry[Fit] = Registry("shape model", group="shape_models")
 """Constructors of the models, by name. See ``docs/extending.md`` for adding one."""
 
 SHAPE_MODELS.register("auto", best_shape)

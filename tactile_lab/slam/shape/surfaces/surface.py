@@ -38,11 +38,13 @@ class Contour:
         points_m: shape (n, 2), metres.
         sigma_m: shape (n,), standard deviation of the contour along its normal.
         is_closed: False if the field has no closed outline and was cut at the largest margin.
+        known: of each point, whether it was touched nearby, shape (n,); None if that was not determined.
     """
 
     points_m: Array
     sigma_m: Array
     is_closed: bool
+    known: Mask | None = None
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class SurfaceMesh:
         sigma_m: shape (n,), standard deviation of the surface along its normal.
         normals: shape (n, 3), outward unit normals at the vertices.
         is_closed: False if the field has no closed surface and was cut at the largest margin.
+        known: of each vertex, whether it was touched nearby, shape (n,); None if that was not determined.
     """
 
     vertices: Array
@@ -62,6 +65,7 @@ class SurfaceMesh:
     sigma_m: Array
     normals: Array
     is_closed: bool
+    known: Mask | None = None
 
 
 def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m: float = 0.060) -> Contour:

@@ -126,6 +126,10 @@ class MotionCost:
         costs[self._is_heavy] = heavy_tailed_cost(slip[self._is_heavy] ** 2).sum(axis=1)
         return np.asarray(costs)
 
+    def scaled_slips(self, rows: Array) -> Array:
+        """Each slip over its standard deviations, shape (k - 1, size)."""
+        return self._scale(rows)
+
     @property
     def _parts(self) -> list[int]:
         return [self._space.translations, self._space.size - self._space.translations]

@@ -14,6 +14,7 @@ or that have few contacts are tested again, and they are driven onto the field o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +36,12 @@ contacts.
 """
 
 _SURFACE_SIGMA_m = 0.0005
+_CLOSE_nats = 8.0
+_TRIED_OF_ALL = 3
+"""A grasp that fits well has a rival worth a try if that is predicted to cost at most this much more; so many are
+tried.
+"""
+
 _LITTLE = 2
 """This few contacts fit many places."""
 
@@ -78,23 +85,67 @@ class _Place:
     change: float
 
 
-def relocalize(best: Hypothesis, sharp: FacetedScorer, noise: MotionNoise, settings: ProposalSettings) -> Hypothesis:
-    """The hypothesis with grasps at other places on its object, as long as that makes it more likely.
+class Relocalizer:
+    """Searches other places of grasps on their object, and remembers those that came close.
 
-    Args:
-        best: a hypothesis; one in space without flat faces or upright walls is unchanged.
-        sharp: scores it by flat faces.
-        noise: of the motion model.
-        settings: of the search.
+    Attributes:
+        rivals: the hypotheses of the last search that were tried and are not more likely, the most likely first.
     """
-    search = _search(best.map)
-    for _ in range(search.rounds):
-        tried = [_try(best.map, place, sharp) for place in _places(best, sharp, noise, settings)]
-        found = min((each for each in tried if each is not None), key=cost, default=best)
-        if found.cost > best.cost - search.least_gain_nats:
-            break
-        best = found
-    return best
+
+    def __init__(self, sharp: FacetedScorer, noise: MotionNoise, settings: ProposalSettings) -> None:
+        """
+        Args:
+            sharp: scores hypotheses by flat faces.
+            noise: of the motion model.
+            settings: of the search.
+        """
+        self._sharp, self._noise, self._settings = sharp, noise, settings
+        self.rivals: tuple[Hypothesis, ...] = ()
+
+    def improve(self, best: Hypothesis) -> Hypothesis:
+        """The hypothesis with grasps at other places on its object, as long as that makes it more likely.
+
+        A hypothesis in space without flat faces or upright walls is unchanged.
+        """
+        search = _search(best.map)
+        for _ in range(search.rounds):
+            tried = self._try(best, self._places(best))
+            if not tried or tried[0].cost > best.cost - search.least_gain_nats:
+                self.rivals = tuple(tried)
+                break
+            best = tried[0]
+        if best.map.dimension == 2:
+            self.rivals = (*self.rivals, *self._try(best, self._places_of_all(best)))
+        return best
+
+    def _try(self, best: Hypothesis, places: list[_Place]) -> list[Hypothesis]:
+        tried = [_try(best.map, place, self._sharp) for place in places]
+        return sorted((each for each in tried if each is not None), key=cost)
+
+    def _places(self, best: Hypothesis) -> list[_Place]:
+        """The most promising other places of all grasps but the first, best first."""
+        known, settings = best.map, self._settings
+        if known.dimension == 3:
+            onto, settings = _onto_solid(best, self._sharp), settings.model_copy(update={"samples": _SAMPLES})
+        else:
+            onto = _onto_others(known, [i for i, grasp in enumerate(known.placed) if i and _fits_poorly(grasp)])
+        search = _search(known)
+        return _promising(_Outlook(known, onto, self._noise, settings), search.hopeless_nats)[: search.tried]
+
+    def _places_of_all(self, best: Hypothesis) -> list[_Place]:
+        """Close rivals of grasps in the plane that fit well where they are: nobody would move them, but they may be
+        wrong nevertheless."""
+        known = best.map
+        well = [i for i, grasp in enumerate(known.placed) if i and len(grasp.kept) and not _fits_poorly(grasp)]
+        return _promising(_Outlook(known, _onto_others(known, well), self._noise, self._settings), _CLOSE_nats)[
+            :_TRIED_OF_ALL
+        ]
+
+
+def _promising(outlook: _Outlook, hopeless_nats: float) -> list[_Place]:
+    """The places of all grasps that may be as likely as the present ones, best first."""
+    found = sorted(outlook.all_places(), key=lambda place: place.change)
+    return [place for place in found if place.change < hopeless_nats]
 
 
 def _search(contact_map: ContactMap) -> _Search:
@@ -110,16 +161,9 @@ def _try(contact_map: ContactMap, place: _Place, sharp: FacetedScorer) -> Hypoth
     return sharp.settle(moved) if contact_map.dimension == 3 else sharp.smooth(moved)
 
 
-def _places(best: Hypothesis, sharp: FacetedScorer, noise: MotionNoise, settings: ProposalSettings) -> list[_Place]:
-    """The most promising other places of all grasps but the first, best first."""
-    search, known = _search(best.map), best.map
-    if known.dimension == 3:
-        onto, settings = _onto_solid(best, sharp), settings.model_copy(update={"samples": _SAMPLES})
-    else:
-        onto = {i: known.without_grasp(i).fit() for i, grasp in enumerate(known.placed) if i and _fits_poorly(grasp)}
-    outlook = _Outlook(known, onto, noise, settings)
-    found = [place for index in onto for place in outlook.places(index)]
-    return sorted(found, key=lambda place: place.change)[: search.tried]
+def _onto_others(known: ContactMap, grasps: Sequence[int]) -> dict[int, Matched]:
+    """The field of all other grasps, for each of these."""
+    return {index: known.without_grasp(index).fit() for index in grasps}
 
 
 def _onto_solid(best: Hypothesis, sharp: FacetedScorer) -> dict[int, Matched]:
@@ -154,6 +198,10 @@ class _Outlook:
         self._wide, self._motion = noise.accumulate(2), MotionCost.of(contact_map, noise)
         self._now = self._motion.steps(self._rows)
         self._known: dict[int, tuple[Array, Array]] = {}
+
+    def all_places(self) -> list[_Place]:
+        """Other places of all grasps."""
+        return [place for index in self._onto for place in self.places(index)]
 
     def places(self, index: int) -> list[_Place]:
         """Other places of one grasp, and of those that follow it as far as a wrong turn may reach."""

@@ -112,14 +112,6 @@ class HypothesisScorer:
                 return contact_map, self._misfit(contact_map)
             contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
 
-    def with_covariances(self, contact_map: ContactMap) -> ContactMap:
-        """The map with the covariance of each pose given all contacts and motions."""
-        size, count = contact_map.space.size, len(contact_map.placed)
-        joint = np.linalg.inv(self._information(contact_map))
-        blocks = joint.reshape(count - 1, size, count - 1, size)[np.arange(count - 1), :, np.arange(count - 1)]
-        later = [replace(one, covariance=block) for one, block in zip(contact_map.placed[1:], blocks, strict=True)]
-        return replace(contact_map, placed=(contact_map.placed[0], *later))
-
     def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
         """The most likely ones of those with equal trajectories.
 

@@ -20,7 +20,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.fixed_lag import unfold
 from tactile_lab.slam.tracking.evidence.motion_cost import estimated_noise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
-from tactile_lab.slam.tracking.faces.relocalization import relocalize
+from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
 from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 from tactile_lab.slam.tracking.joint.branching import Branching
 from tactile_lab.slam.tracking.joint.deferred_association import (
@@ -31,6 +31,7 @@ from tactile_lab.slam.tracking.joint.deferred_association import (
 )
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest, weights
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
+from tactile_lab.slam.tracking.joint.pose_covariance import PoseCovariances, with_covariances
 from tactile_lab.slam.tracking.joint.settings import JointSettings
 from tactile_lab.slam.tracking.joint.trajectory_splicing import splice_trajectories
 
@@ -84,6 +85,8 @@ class JointTracker:
         self._whole: tuple[ContactMap, ContactMap] | None = None
         self._refined: tuple[ContactMap, ContactMap] | None = None
         self._has_ended = False
+        self._rivals: tuple[Hypothesis, ...] = ()
+        self._common_covariances = np.empty((0, self._space.size, self._space.size))
         self.effective_count = 1.0
 
     @property
@@ -114,6 +117,21 @@ class JointTracker:
     def hypotheses(self) -> tuple[Hypothesis, ...]:
         """The present hypotheses, most likely first."""
         return tuple(self._hypotheses)
+
+    @property
+    def common_covariances(self) -> Array:
+        """At the end of a session: of the last poses in the best common object frame, shape (n, size, size).
+
+        See :class:`~tactile_lab.slam.tracking.joint.pose_covariance.PoseCovariances`. Settled grasps of a long session
+        have none.
+        """
+        return self._common_covariances
+
+    @property
+    def rivals(self) -> tuple[Hypothesis, ...]:
+        """At the end of a session: hypotheses that differ from the most likely one and were found less likely."""
+        rivals = (*self._hypotheses[1:], *self._rivals) if self._has_ended else ()
+        return tuple(replace(one, map=unfold(one.map)) for one in rivals)
 
     @property
     def _has_settled(self) -> bool:
@@ -191,7 +209,9 @@ class JointTracker:
             self._share_best_kernel()
         self._hypotheses = [self._associate_deferred(one) for one in self._hypotheses]
         faceted = self._score_with_facets()
-        faceted[0] = replace(faceted[0], map=self._scorer.with_covariances(faceted[0].map))
+        found = PoseCovariances.of(faceted[0].map, self._noise)
+        faceted[0] = replace(faceted[0], map=with_covariances(faceted[0].map, found.birth))
+        self._common_covariances = found.common
         self._hypotheses = [replace(one, map=unfold(one.map)) for one in faceted]
         self._has_ended = True
 
@@ -218,11 +238,11 @@ class JointTracker:
 
     def _relocalize(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
         """The hypothesis with grasps relocalized on its object."""
-        return self.mechanisms.improve(
-            "placing on the object",
-            self._retry_unplaced(hypothesis, sharp),
-            lambda given: relocalize(given, sharp, self._noise, self._settings.proposals),
-        )
+        relocalizer = Relocalizer(sharp, self._noise, self._settings.proposals)
+        placed = self._retry_unplaced(hypothesis, sharp)
+        found = self.mechanisms.improve("placing on the object", placed, relocalizer.improve)
+        self._rivals = relocalizer.rivals
+        return found
 
     def _retry_unplaced(self, best: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
         """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""

@@ -11,8 +11,9 @@ import pytest
 
 from drivers.core.errors import SessionError, TrackingError, WriteError
 from tactile_lab.experiments import runner
-from tactile_lab.experiments.cells import Cell, Row, grid, planned_cells
-from tactile_lab.experiments.runner import RunnerSettings, execute, run_cells
+from tactile_lab.experiments.cells import Cell, Row, execute, grid, planned_cells
+from tactile_lab.experiments.execution import source_version
+from tactile_lab.experiments.runner import RunnerSettings, run_cells
 from tactile_lab.experiments.runs.graph_runs import solve_stressed_graph
 from tests.support.repository import REPOSITORY
 
@@ -119,7 +120,7 @@ def test_version_covers_every_module_that_experiments_import_but_those_that_draw
     needed |= graph.find_descendants("tactile_lab.experiments")
     drawing = ("tactile_lab.report", "tactile_lab.experiments.results", "tactile_lab.experiments.plot")
     computing = {name for name in needed if not name.startswith(drawing)}
-    covered = {".".join(file.relative_to(REPOSITORY).with_suffix("").parts) for file in runner.sources()}
+    covered = {".".join(file.relative_to(REPOSITORY).with_suffix("").parts) for file in source_version.sources()}
     covered |= {name.removesuffix(".__init__") for name in covered}
     assert {
         "sessions.conductor.conductor",
@@ -131,7 +132,7 @@ def test_version_covers_every_module_that_experiments_import_but_those_that_draw
 
 
 def test_version_covers_the_rigs_descriptions_and_calibrations() -> None:
-    names = {file.relative_to(REPOSITORY).as_posix() for file in runner.sources()}
+    names = {file.relative_to(REPOSITORY).as_posix() for file in source_version.sources()}
     assert {
         "tactile_lab/rigs/sim.yaml",
         "tactile_lab/rigs/calibrations/simulated-hand/forearm.yaml",
@@ -143,10 +144,10 @@ def test_version_changes_with_any_source(tmp_path: Path, monkeypatch: pytest.Mon
     file = tmp_path / "sessions" / "conductor.py"
     file.parent.mkdir()
     file.write_text("A = 1\n")
-    monkeypatch.setattr(runner, "_ROOT", tmp_path)
-    before = runner.version.__wrapped__()
+    monkeypatch.setattr(source_version, "_ROOT", tmp_path)
+    before = source_version.version.__wrapped__()
     file.write_text("A = 2\n")
-    assert runner.version.__wrapped__() != before
+    assert source_version.version.__wrapped__() != before
 
 
 def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:

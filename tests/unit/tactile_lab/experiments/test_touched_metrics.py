@@ -38,7 +38,7 @@ def told(data: SpatialGrasps, mesh: trimesh.Trimesh, sigma_m: float) -> SlamResu
     vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, 0.004)
     outward = np.asarray(trimesh.Trimesh(vertices, faces, process=False).vertex_normals)
     surface = SurfaceMesh(vertices, np.asarray(faces), np.full(len(vertices), sigma_m), outward, True)
-    return SlamResult("joint", 0, 3, (), (), (), (), Gpis.fit(points, normals), None, surface, "ok")
+    return SlamResult("joint", 0, 3, (), (), (), (), Gpis.fit(points, normals), None, surface, "complete")
 
 
 def box(longer_m: float = 0.0, wider_m: float = 0.0) -> trimesh.Trimesh:

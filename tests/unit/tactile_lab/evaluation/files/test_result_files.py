@@ -71,14 +71,14 @@ def test_every_promised_file_is_written(tmp_path: Path, result: SlamResult, reco
 def test_what_is_known_well_is_written_apart(tmp_path: Path, result: SlamResult, recorded: Recorded) -> None:
     shape = result.contour if result.contour is not None else result.mesh
     assert shape is not None
-    write_results(tmp_path, result, recorded.grasps, largest_sigma_m=float(np.quantile(shape.sigma_m, 0.8)))
+    write_results(tmp_path, result, recorded.grasps, largest_sigma_m=float(np.quantile(shape.sigma_m, 0.6)))
     if result.contour is not None:
         rows = (tmp_path / "known.csv").read_text().splitlines()
         assert rows[0] == "piece,x_m,y_m"
-        assert 0.7 * len(shape.sigma_m) < len(rows) - 1 < len(shape.sigma_m)
+        assert 0.5 * len(shape.sigma_m) < len(rows) - 1 < len(shape.sigma_m)
     else:
         known, whole = (trimesh.load_mesh(tmp_path / name) for name in ("known.ply", "mesh.ply"))
-        assert 0.5 * len(whole.faces) < len(known.faces) < len(whole.faces)
+        assert 0.3 * len(whole.faces) < len(known.faces) < len(whole.faces)
 
 
 def test_results_read_back(tmp_path: Path, result: SlamResult, recorded: Recorded) -> None:
@@ -176,16 +176,19 @@ def test_contour_files_of_older_versions_have_no_standard_deviations(tmp_path: P
     found = read_contour(tmp_path / "contour.csv")
     assert found.points_m.tolist() == [[0, 0], [1, 0], [0, 1]]
     assert found.sigma_m.shape == (0,)
+    assert found.known.all()
 
 
 def test_contour_is_closed_and_reads_back(tmp_path: Path) -> None:
     sigma_m = 1e-4 * np.arange(1.0, len(ELL) + 1)
-    (tmp_path / "contour.csv").write_text(contour_text(ELL, sigma_m))
+    known = np.arange(len(ELL)) % 2 == 0
+    (tmp_path / "contour.csv").write_text(contour_text(ELL, sigma_m, known))
     lines = (tmp_path / "contour.csv").read_text().splitlines()
     assert (len(lines), lines[1]) == (len(ELL) + 2, lines[-1])
     found = read_contour(tmp_path / "contour.csv")
     assert np.array_equal(found.points_m, ELL)
     assert np.array_equal(found.sigma_m, sigma_m)
+    assert np.array_equal(found.known, known)
 
 
 def test_ring_without_area_is_a_shape_error() -> None:

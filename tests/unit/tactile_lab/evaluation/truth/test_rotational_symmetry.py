@@ -10,7 +10,12 @@ from gtsam import Pose2, Pose3, Rot3
 
 from drivers.core.poses import spatial
 from tactile_lab.evaluation.registration import registration_rms_mm
-from tactile_lab.evaluation.truth.rotational_symmetry import ANY_TURN, modulo_symmetry, symmetry_turns
+from tactile_lab.evaluation.truth.rotational_symmetry import (
+    ANY_TURN,
+    modulo_symmetry,
+    outline_symmetry,
+    symmetry_turns,
+)
 from tactile_lab.experiments.data.sensing import planar_pose
 from tactile_lab.experiments.data.solids import DATA_VARIABLE, solid
 from tactile_lab.experiments.data.spatial_data import simulate
@@ -76,3 +81,18 @@ def test_poses_that_are_not_known_or_do_not_stand_stay_as_they_are() -> None:
     turned = Pose3(Rot3.Rz(1.0), np.zeros(3))
     assert modulo_symmetry([None, turned], [turned, None], ANY_TURN) == (None, turned)
     assert modulo_symmetry([turned, turned], [lying, turned], ANY_TURN) == (turned, turned)
+
+
+def test_sixths_of_a_turn_of_an_outline_do_not_count_wherever_its_frame_is() -> None:
+    angles, centre_m = np.deg2rad(60.0 * np.arange(6)), np.array([0.03, -0.01])
+    found = outline_symmetry(0.04 * np.column_stack([np.cos(angles), np.sin(angles)]) + centre_m)
+    assert found is not None
+    assert found.order == 6
+    truth = [spatial(Pose2(0.1 * yaw_rad, 0.0, yaw_rad)) for yaw_rad in (0.0, 0.5, 1.0)]
+    turns = [found.offset(number) for number in (0, 1, -2)]
+    estimate = [pose * spatial(Pose2(*turn)) for pose, turn in zip(truth, turns, strict=True)]
+    told = modulo_symmetry(estimate, truth, 6, found.centre_m)
+    for pose, true in zip(told, truth, strict=True):
+        assert pose is not None
+        assert pose.equals(true, 1e-4)
+    assert outline_symmetry(0.04 * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])) is None

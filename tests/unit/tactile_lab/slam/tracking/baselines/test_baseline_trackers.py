@@ -35,7 +35,7 @@ DATA = simulate("rectangle", 3, count=8)
 def test_known_poses_place_every_grasp_where_the_object_was() -> None:
     result = run(DATA, "known-pose", DATA.world_T_body)
     assert registration_mm(DATA, result) < 1e-6
-    assert result.status == "ok"
+    assert result.status == "complete"
     assert result.loops == ()
     assert [step.verdict for step in result.steps] == ["first"] + ["tracked"] * 7
 

@@ -14,7 +14,6 @@ from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
-from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother, smoothed_with_faces
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, flat_faces
@@ -111,14 +110,3 @@ def test_the_way_to_a_contact_that_is_left_out_is_no_evidence() -> None:
     fewer = replace(grasp, left_out=frozenset({0}))
     dropped = len(grasp.free_world_m) - len(fewer.free_world_m)
     assert dropped == np.sum(grasp.contacts_world.free_of == 0) > 0
-
-
-def test_covariances_of_all_poses_hold_their_errors() -> None:
-    contact_map = true_map("ellipse", count=10)
-    rows, _ = PoseEvidence(contact_map, NOISE).maximise(contact_map.rows, 60)
-    rated = HypothesisScorer(NOISE, 5.0).with_covariances(contact_map.with_rows(rows))
-    errors = [
-        contact_map.space.deviation(grasp.row, true.row) @ np.linalg.solve(grasp.covariance, grasp.row - true.row)
-        for grasp, true in zip(rated.placed[1:], contact_map.placed[1:], strict=True)
-    ]
-    assert np.median(errors) < 7.8

@@ -14,7 +14,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
-from tactile_lab.slam.tracking.faces.relocalization import relocalize
+from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
 from tactile_lab.slam.tracking.faces.solid_face_extents import solid_ends
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
 from tactile_lab.slam.tracking.joint.proposals import ProposalSettings
@@ -106,7 +106,7 @@ def test_a_tabulated_solid_is_like_the_solid(l_block: ContactMap, scale: float) 
 def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: ContactMap) -> None:
     wrong = rated(moved(l_block, 9, [0.012, -0.02, np.deg2rad(90.0)]))
     right = rated(l_block)
-    found = relocalize(wrong, judge_of(l_block), NOISE, ProposalSettings())
+    found = Relocalizer(judge_of(l_block), NOISE, ProposalSettings()).improve(wrong)
     assert wrong.cost > right.cost + 5
     assert found.cost < wrong.cost - 5
     gap = l_block.space.deviation(found.map.rows[9:10], l_block.rows[9])[0]
@@ -121,7 +121,7 @@ def test_grasps_that_took_a_wrong_turn_together_are_turned_back_together() -> No
     for index in (5, 6, 7, 8):
         turned = moved(turned, index, [0.0, 0.0, 2 * np.pi / 3])
     wrong, right = rated(turned), rated(prism)
-    found = relocalize(wrong, judge_of(prism), NOISE, ProposalSettings())
+    found = Relocalizer(judge_of(prism), NOISE, ProposalSettings()).improve(wrong)
     assert wrong.cost > right.cost + 5
     assert found.cost < right.cost + 0.5
     gaps = prism.space.deviation(found.map.rows[5:9], right.map.rows[5:9])
@@ -131,7 +131,7 @@ def test_grasps_that_took_a_wrong_turn_together_are_turned_back_together() -> No
 def test_what_is_round_has_no_other_places() -> None:
     contact_map = true_map("ellipsoid", count=12, dimension=3)
     smooth = HypothesisScorer(NOISE, 2.0).score(contact_map)
-    assert relocalize(smooth, judge_of(contact_map), NOISE, ProposalSettings()) is smooth
+    assert Relocalizer(judge_of(contact_map), NOISE, ProposalSettings()).improve(smooth) is smooth
 
 
 @pytest.fixture(scope="module")
@@ -143,7 +143,7 @@ def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outli
     """Driven onto the others' field: two of its contacts are left out where it is, none where it belongs."""
     elsewhere = moved(outline, 7, [0.02, -0.015, np.deg2rad(60.0)])
     wrong = judge_of(outline).better(elsewhere.without_contact(7, 0).without_contact(7, 1))
-    found = relocalize(wrong, judge_of(outline), NOISE, ProposalSettings())
+    found = Relocalizer(judge_of(outline), NOISE, ProposalSettings()).improve(wrong)
     assert found.cost < wrong.cost - 10
     gap = outline.space.deviation(found.map.rows[7:8], outline.rows[7])[0]
     assert np.linalg.norm(gap[:2]) < 0.006
@@ -153,4 +153,4 @@ def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outli
 
 def test_grasps_that_fit_an_outline_stay(outline: ContactMap) -> None:
     right = judge_of(outline).better(outline)
-    assert relocalize(right, judge_of(outline), NOISE, ProposalSettings()) is right
+    assert Relocalizer(judge_of(outline), NOISE, ProposalSettings()).improve(right) is right

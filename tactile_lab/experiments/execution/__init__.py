@@ -1,0 +1,1 @@
+"""Where the cells of an experiment are run: in this process, in others, or on a cluster."""

@@ -1,0 +1,130 @@
+"""Experiment on what results say of themselves: whether stated regions hold the truth, and bad results say so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from drivers.core.poses import spatial, transform_points
+from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+from tactile_lab.experiments.cells import Cell, Setting, grid
+from tactile_lab.experiments.data import planar_data, second_family, spatial_data
+from tactile_lab.experiments.data.planar_data import PlanarGrasps
+from tactile_lab.experiments.data.sensing import SimulatedGrasps
+from tactile_lab.experiments.data.spatial_data import SpatialGrasps
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.run_metrics import slam_figures
+from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, SURFACE_INSIDE
+from tactile_lab.experiments.studies.plots import ranges
+from tactile_lab.experiments.summary import Column
+from tactile_lab.slam.result import SlamResult
+from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+
+FIRST, SECOND = "first", "second"
+"""The families of simulated contacts: :mod:`planar_data` and :mod:`spatial_data`, and :mod:`second_family`."""
+
+PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")
+SOLIDS = ("box-12x6x6", "l-block", "cylinder", "ellipsoid")
+_MORE_GRASPS_IN_SPACE = 1.5
+_FAR_SIGMAS, _FAR_SHARE = 5.0, 0.01
+"""A shape is off if more than this share of it is farther from the truth than so many stated standard deviations."""
+
+
+def _settings(grasps: int) -> list[Setting]:
+    shapes = {(FIRST, 2): PLANAR_SHAPES, (FIRST, 3): SOLIDS, (SECOND, 2): second_family.SHAPES}
+    shapes[SECOND, 3] = second_family.SHAPES
+    return [
+        setting
+        for (family, dimension), names in shapes.items()
+        for wrong in ((0, 10) if (family, dimension) != (FIRST, 3) else (0,))
+        for setting in grid(family=[family], dimension=[dimension], wrong=[wrong], shape=names, grasps=[grasps])
+    ]
+
+
+def assessed_run(cell: Cell) -> dict[str, Any]:
+    """Judge a run of the default method and what it says of itself. Cell: family, dimension, wrong (percent), shape,
+    grasps (in the plane; in space half as many again).
+
+    Approach paths are unknown where contacts are wrong.
+    """
+    data = _data(cell)
+    slam = TactileSlam(SlamSettings(dimension=cell["dimension"]), cell.seed)
+    for grasp in data.grasps:
+        slam.add_grasp(grasp)
+    result = slam.finish()
+    figures = slam_figures(data, result)
+    registration_mm = figures["registration_mm"]
+    off = registration_mm is None or registration_mm > FAILURE_LIMIT_MM or _far_share(data, result) > _FAR_SHARE
+    told = result.status != "complete"
+    return {
+        **figures,
+        "known_share": result.known_share,
+        "doubts": [doubt.name for doubt in result.doubts],
+        "off": int(off),
+        "off_told": int(off and told),
+        "good": int(not off),
+        "good_told": int(not off and told),
+    }
+
+
+def _data(cell: Cell) -> PlanarGrasps | SpatialGrasps:
+    flat, wrong = cell["dimension"] == 2, cell["wrong"] / 100
+    count = cell["grasps"] if flat else round(_MORE_GRASPS_IN_SPACE * cell["grasps"])
+    if cell["family"] == SECOND:
+        found = second_family.simulate(
+            cell["shape"], cell.seed, dimension=cell["dimension"], count=count, wrong_share=wrong, paths=not wrong
+        )
+        if flat:
+            return PlanarGrasps(found.shape, found.grasps, found.world_T_body, found.body.outline_m)
+        corners = found.body.triangles_m
+        mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+        return SpatialGrasps(found.shape, found.grasps, found.world_T_body, mesh)
+    if not flat:
+        return spatial_data.simulate(cell["shape"], cell.seed, count=count)
+    planar = planar_data.simulate(cell["shape"], cell.seed, count=count, outlier_share=wrong)
+    return planar_data.without_paths(planar) if wrong else planar
+
+
+def _far_share(data: SimulatedGrasps, result: SlamResult) -> float:
+    """Share of the estimated shape that is many stated standard deviations off, at the best fit; 1 without a shape."""
+    if isinstance(data, PlanarGrasps) and result.contour is not None:
+        fit = align_contours(result.contour.points_m, data.outline_m)
+        points = transform_points(spatial(fit), np.pad(result.contour.points_m, ((0, 0), (0, 1))))[:, :2]
+        errors_m, sigma_m = distances_to_polygon(points, data.outline_m), result.contour.sigma_m
+    elif isinstance(data, SpatialGrasps) and result.mesh is not None:
+        moved = transform_points(align_meshes(result.mesh, data.mesh, upright=True), result.mesh.vertices)
+        errors_m, sigma_m = distances_to_mesh(moved, data.mesh), result.mesh.sigma_m
+    else:
+        return 1.0
+    return float(np.mean(errors_m > _FAR_SIGMAS * sigma_m))
+
+
+def _panel(cell: Cell) -> str:
+    where = "in the plane" if cell["dimension"] == 2 else "in space"
+    return f"{cell['family']} family, {where}, {cell['wrong']} % wrong"
+
+
+COVERAGE = Experiment(
+    "coverage",
+    "What the default method says of its own results, on two families of simulated contacts.",
+    _settings,
+    assessed_run,
+    (
+        REGISTRATION,
+        POSES_INSIDE,
+        Column("in the common frame", "common_poses_inside", 0, kind="shares"),
+        SURFACE_INSIDE,
+        Column("touched", "known_share", 0, kind="percent"),
+        Column("off by 5 mm or 5 sigma", "off", 0, kind="sum"),
+        Column("of these told", "off_told", 0, kind="sum"),
+        Column("good", "good", 0, kind="sum"),
+        Column("of these told", "good_told", 0, kind="sum"),
+    ),
+    ranges("shape", "registration, mm", "registration_mm", _panel),
+    pooled=("shape",),
+    grasps=16,
+)

@@ -1,0 +1,113 @@
+"""What may be believed of an estimate: its status, its doubts in words, its alternatives, and its known part."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tactile_lab.slam.doubt.known_part import known_part, with_guesses_told
+from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, turned_by_symmetry
+from tactile_lab.slam.doubt.signs import signs
+from tactile_lab.slam.doubt.status import (
+    LARGEST_REFUSED_SHARE,
+    LEAST_KNOWN_SHARE,
+    Alternative,
+    Doubt,
+    Status,
+    status_of,
+)
+from tactile_lab.slam.doubt.symmetry import NEARLY_ALIKE_m, Symmetry, symmetry_of
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
+from tactile_lab.slam.tracking.trackers import Tracker, TrackingSettings
+
+
+@dataclass(frozen=True)
+class Assessment:
+    """What may be believed of an estimate.
+
+    Attributes:
+        status: see :mod:`tactile_lab.slam.doubt.status`.
+        shape: the outline or surface, with its known part, and a standard deviation of the rest that says it is a
+            guess; None without one.
+        known_share: share of the shape that was touched; None without a shape.
+        doubts: all reasons to doubt it.
+        alternatives: other placings of grasps, the most likely first.
+    """
+
+    status: Status
+    shape: Contour | SurfaceMesh | None
+    known_share: float | None
+    doubts: tuple[Doubt, ...]
+    alternatives: tuple[Alternative, ...]
+
+
+def assess(
+    tracker: Tracker | None,
+    shape: Contour | SurfaceMesh | None,
+    settings: TrackingSettings,
+    refused: Sequence[bool],
+    *,
+    lost: bool,
+    origin_height_m: float,
+) -> Assessment:
+    """Assess a finished estimate.
+
+    Args:
+        tracker: finished; None if no object frame was ever defined.
+        shape: the final outline or surface, object frame.
+        settings: of the estimation.
+        refused: of every grasp, whether it could not be placed.
+        lost: whether the object could not be followed.
+        origin_height_m: height of the object frame's origin over the table.
+    """
+    if tracker is None:
+        return Assessment("lost", shape, None, (), ())
+    contact_map = tracker.refined
+    share = None
+    if shape is not None:
+        stands = settings.freedom == "table"
+        part = known_part(shape, contact_map.contacts, -origin_height_m if stands else None)
+        shape, share = with_guesses_told(shape, part), part.share
+    symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= LEAST_KNOWN_SHARE else None
+    others = _alternatives(tracker, contact_map, settings, shape, symmetry, origin_height_m)
+    doubts = (
+        *signs(contact_map, settings.motion, poses_given=settings.method == "known-pose"),
+        *doubts_of(others),
+        *_refused(refused),
+        *(
+            [Doubt("symmetry", symmetry.words, grave=False)]
+            if symmetry is not None and symmetry.interchangeable
+            else []
+        ),
+    )
+    refused_share = sum(refused) / max(len(refused), 1)
+    status = status_of(lost=lost, known_share=share, refused_share=refused_share, doubts=doubts)
+    return Assessment(status, shape, share, doubts, others)
+
+
+def _alternatives(
+    tracker: Tracker,
+    contact_map: ContactMap,
+    settings: TrackingSettings,
+    shape: Contour | SurfaceMesh | None,
+    symmetry: Symmetry | None,
+    origin_height_m: float,
+) -> tuple[Alternative, ...]:
+    """Those of method "joint", which compares trajectories by their evidence."""
+    if not isinstance(tracker, JointTracker):
+        return ()
+    found = costs_above(tracker.hypotheses[0], tracker.rivals)
+    near = None if shape is None else symmetry_of(shape, NEARLY_ALIKE_m)
+    if near is not None:
+        found += turned_by_symmetry(contact_map, near, settings.motion, settings.joint.proposals.unexplained_cost)
+    return alternatives(contact_map, found, symmetry, origin_height_m)
+
+
+def _refused(refused: Sequence[bool]) -> list[Doubt]:
+    grasps = tuple(index for index, each in enumerate(refused) if each)
+    if len(grasps) <= LARGEST_REFUSED_SHARE * len(refused):
+        return []
+    words = f"{len(grasps)} of {len(refused)} grasps could not be placed: the object may have been elsewhere then"
+    return [Doubt("refused-grasps", words, grasps, grave=False)]

@@ -1,0 +1,125 @@
+"""Cheap signs that some grasps are probably placed wrongly, each computed from the final trajectory alone.
+
+A grasp that is turned the wrong way round needs two slips that undo each other: one into the wrong pose and one out of
+it. A slip that the motion model hardly allows, a jump, or contacts that fit before some grasp and no longer after it
+(another object, or a moved one) are visible in the same way. Each sign has a name that files and pages repeat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.stats import chi2, hypergeom
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.doubt.status import Doubt
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+
+_UNDONE = 0.02
+"""Probability of each of two slips that undo each other, or less: chance makes one such pair in a hundred sessions."""
+
+_UNDONE_COSINE = -0.7
+"""Cosine of the angle between two slips that undo each other, or less; for a rotation it is -1 or 1."""
+
+_UNLIKELY = 5e-4
+"""Probability of a slip under the motion model below which it is told."""
+
+_JUMP_m = 0.100
+_OTHER_OBJECT = 1e-4
+_LEAST_GRASPS = 3
+"""On each side of the grasp from which on another object may have been touched."""
+
+_GRAVE_FIRST = 2
+"""So many wrong contacts of the first grasp make the object frame itself doubtful; a single one is only told."""
+
+
+def signs(contact_map: ContactMap, noise: MotionNoise, *, poses_given: bool = False) -> tuple[Doubt, ...]:
+    """All signs of a trajectory that something is wrong with it.
+
+    Args:
+        contact_map: all grasps at their final poses, with the contacts that are left out.
+        noise: of the motion model.
+        poses_given: whether the poses were given and not estimated: then slips are no sign.
+    """
+    about_motion: tuple[Callable[[ContactMap, MotionNoise], list[Doubt]], ...] = (_undone, _unlikely, _jumps)
+    found = [] if poses_given else [doubt for sign in about_motion for doubt in sign(contact_map, noise)]
+    return (*found, *_other_object(contact_map), *_first_grasp(contact_map))
+
+
+def _slips(contact_map: ContactMap, noise: MotionNoise) -> tuple[Array, Array]:
+    """Slips of a trajectory in standard deviations, shape (k - 1, size), and whether each is bound to the hand."""
+    cost = MotionCost.of(contact_map, noise)
+    bound = np.array([how is Moved.AS_MEANT for how in contact_map.moved[1:]], dtype=bool)
+    return cost.scaled_slips(contact_map.rows), bound
+
+
+def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
+    slips, bound = _slips(contact_map, noise)
+    split, found = contact_map.space.translations, []
+    for part, kind in ((slice(None, split), "moved"), (slice(split, None), "turned")):
+        vectors = slips[:, part]
+        lengths = np.linalg.norm(vectors, axis=1)
+        least = float(np.sqrt(chi2.isf(_UNDONE, vectors.shape[1])))
+        cosines = np.sum(vectors[1:] * vectors[:-1], axis=1) / np.maximum(lengths[1:] * lengths[:-1], 1e-12)
+        opposite = (cosines < _UNDONE_COSINE) & (np.minimum(lengths[1:], lengths[:-1]) > least)
+        for step in np.flatnonzero(opposite & bound[1:] & bound[:-1]):
+            grasp = int(step) + 1
+            words = f"grasp {grasp + 1} is {kind} by a slip that the next one undoes: it is probably placed wrongly"
+            found.append(Doubt("undone-slips", words, (grasp,)))
+    return found
+
+
+def _unlikely(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
+    slips, bound = _slips(contact_map, noise)
+    probabilities = chi2.sf(np.sum(slips**2, axis=1), contact_map.space.size)
+    return [
+        Doubt(
+            "unlikely-slip",
+            f"the slip before grasp {step + 2} is improbable ({probabilities[step]:.0e})",
+            (int(step) + 1,),
+        )
+        for step in np.flatnonzero((probabilities < _UNLIKELY) & bound)
+    ]
+
+
+def _jumps(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
+    space, rows = contact_map.space, contact_map.rows
+    expected = space.compose(contact_map.motions[1:], rows[:-1])
+    away_m = np.linalg.norm(space.deviation(rows[1:], expected)[:, : space.translations], axis=1)
+    return [
+        Doubt("jump", f"the object jumps by {1e3 * away_m[step]:.0f} mm before grasp {step + 2}", (int(step) + 1,))
+        for step in np.flatnonzero(away_m > _JUMP_m)
+    ]
+
+
+def _other_object(contact_map: ContactMap) -> list[Doubt]:
+    """Whether contacts fit up to some grasp and mostly do not from then on, or the other way round.
+
+    The exact test of Fisher at the most telling grasp, with a limit that allows for the choice of the grasp.
+    """
+    wrong = np.array([len(grasp.left_out) for grasp in contact_map.placed])
+    total = np.array([len(grasp.contacts_world) for grasp in contact_map.placed])
+    count, found = len(wrong), []
+    for split in range(_LEAST_GRASPS, count - _LEAST_GRASPS + 1):
+        after = int(wrong[split:].sum())
+        chance = hypergeom.sf(after - 1, int(total.sum()), int(wrong.sum()), int(total[split:].sum()))
+        before = int(wrong[:split].sum())
+        chance = min(chance, hypergeom.sf(before - 1, int(total.sum()), int(wrong.sum()), int(total[:split].sum())))
+        found.append((float(chance), split))
+    chance, split = min(found, default=(1.0, 0))
+    if chance > _OTHER_OBJECT:
+        return []
+    words = f"contacts before and from grasp {split + 1} on do not fit one object: was it exchanged, moved or deformed?"
+    return [Doubt("other-object", words, tuple(range(split, count)))]
+
+
+def _first_grasp(contact_map: ContactMap) -> list[Doubt]:
+    wrong = len(contact_map.placed[0].left_out)
+    if contact_map.archive or not wrong:
+        return []
+    which = "contact" if wrong == 1 else "contacts"
+    words = f"{wrong} {which} of the first grasp, which defines the object frame, fit nothing else"
+    return [Doubt("first-grasp", words, (0,), grave=wrong >= _GRAVE_FIRST)]

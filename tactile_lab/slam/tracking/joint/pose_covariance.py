@@ -1,0 +1,78 @@
+"""Covariances of a finished trajectory's poses: in the object frame of the first grasp, and in the best common one.
+
+A smooth field with a long kernel states covariances that are too small. Flat faces whose places are estimated with the
+poses do not, not even of round objects, so they are used wherever contacts form any (docs/results: coverage).
+
+The object frame is born at the first grasp, whose pose is therefore given. An error of that grasp is an error of all
+other poses in the same direction; in the frame in which all grasps agree best it counts as one of many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
+from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
+
+_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class PoseCovariances:
+    """Of each pose of a trajectory, shape (n, size, size).
+
+    Attributes:
+        birth: in the object frame of the first grasp, whose own is zero.
+        common: in the object frame in which all grasps agree best, their mean.
+    """
+
+    birth: Array
+    common: Array
+
+    @classmethod
+    def of(cls, contact_map: ContactMap, noise: MotionNoise) -> PoseCovariances:
+        """From poses of largest evidence, all contacts and motions."""
+        count, size = len(contact_map.placed), contact_map.space.size
+        joint = np.zeros((count * size, count * size))
+        if count > 1:
+            joint[size:, size:] = np.linalg.inv(_information(contact_map, noise))
+        centred = np.eye(count * size) - _mean_frame(contact_map)
+        return cls(_blocks(joint, size), _blocks(centred @ joint @ centred.T, size))
+
+
+def with_covariances(contact_map: ContactMap, covariances: Array) -> ContactMap:
+    """The map with the covariance of each pose but the first."""
+    later = [replace(one, covariance=each) for one, each in zip(contact_map.placed[1:], covariances[1:], strict=True)]
+    return replace(contact_map, placed=(contact_map.placed[0], *later))
+
+
+def _information(contact_map: ContactMap, noise: MotionNoise) -> Array:
+    """Inverse of the joint covariance of all poses but the first."""
+    try:
+        return FacetCertainty.of(contact_map, noise).information_of_poses
+    except (ShapeError, np.linalg.LinAlgError):  # the contacts enclose nothing, or too few of them form faces
+        return PoseEvidence(contact_map, noise).information(contact_map.rows)
+
+
+def _mean_frame(contact_map: ContactMap) -> Array:
+    """By all pose vectors: how each changes with the mean of all object frames, shape (n size, n size)."""
+    space, rows = contact_map.space, contact_map.rows
+    count, size = len(rows), space.size
+    by_frame = np.zeros((count, size, size))
+    for axis in range(size):
+        step = np.tile(_STEP * np.eye(size)[axis], (count, 1))
+        by_frame[:, :, axis] = space.deviation(space.compose(rows, step), rows) / _STEP
+    to_frame = np.linalg.inv(by_frame)
+    return by_frame.reshape(-1, size) @ to_frame.transpose(1, 0, 2).reshape(size, -1) / count
+
+
+def _blocks(joint: Array, size: int) -> Array:
+    """The diagonal blocks of a joint covariance, shape (n, size, size)."""
+    count = len(joint) // size
+    return joint.reshape(count, size, count, size)[np.arange(count), :, np.arange(count)]

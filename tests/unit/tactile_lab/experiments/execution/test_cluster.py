@@ -1,0 +1,143 @@
+"""Experiments on a Dask cluster: the same rows, a worker that dies, and clusters that cannot be used."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import distributed
+import pytest
+from distributed import Client
+
+from drivers.core.errors import ConfigurationError, SessionError
+from tactile_lab.experiments.cells import Cell, Row
+from tactile_lab.experiments.execution import cluster as cluster_module
+from tactile_lab.experiments.runner import RunnerSettings, run_cells
+from tests.support import cluster_work
+from tests.support.dask_cluster import DaskCluster
+
+CELLS = [Cell((("noise", noise),), seed) for seed in range(6) for noise in (25, 50)]
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskCluster]:
+    with DaskCluster(tmp_path_factory.mktemp("cluster"), workers=2) as started:
+        with Client(started.address) as client:
+            client.submit(os.getpid).result()  # Dask's threads in this process, which stay
+        yield started
+
+
+def rows_of(cluster: DaskCluster, file: Path, work: object, cells: list[Cell] = CELLS) -> list[Row]:
+    return run_cells("test", cells, work, file, RunnerSettings(scheduler=cluster.address))  # type: ignore[arg-type]
+
+
+def test_a_cluster_makes_the_rows_that_one_process_makes(cluster: DaskCluster, tmp_path: Path) -> None:
+    alone = run_cells("test", CELLS, cluster_work.square, tmp_path / "alone.jsonl")
+    assert rows_of(cluster, tmp_path / "together.jsonl", cluster_work.square) == alone
+    assert alone[3].problem == "nothing fits"  # a failed run is a result
+
+
+def test_what_a_client_left_undone_is_made_by_the_next(cluster: DaskCluster, tmp_path: Path) -> None:
+    file = tmp_path / "runs.jsonl"
+    with pytest.raises(KeyboardInterrupt):
+        run_cells(
+            "test",
+            CELLS,
+            cluster_work.square,
+            file,
+            RunnerSettings(scheduler=cluster.address),
+            finished=_interrupt_at_four,
+        )
+    kept = len(file.read_text().splitlines()) - 1
+    assert kept == 4
+    assert len(rows_of(cluster, file, cluster_work.square)) == len(CELLS)
+    assert len(file.read_text().splitlines()) - 1 == len(CELLS)
+
+
+def _interrupt_at_four(row: Row, done: int, total: int) -> None:
+    if done == 4:
+        raise KeyboardInterrupt
+
+
+def test_a_worker_that_is_killed_costs_no_run(cluster: DaskCluster, tmp_path: Path) -> None:
+    def kill_one(row: Row, done: int, total: int) -> None:
+        if done == 3:
+            os.kill(int(row.figures["process"]), signal.SIGKILL)  # type: ignore[index]
+
+    settings = RunnerSettings(scheduler=cluster.address)
+    rows = run_cells("test", CELLS, cluster_work.named, tmp_path / "runs.jsonl", settings, kill_one)
+    assert [row.cell for row in rows] == CELLS
+    assert len({row.figures["process"] for row in rows if row.figures}) >= 2
+
+
+@pytest.mark.long  # its workers die and start again four times
+def test_a_run_that_kills_its_workers_is_named_when_all_others_are_made(cluster: DaskCluster, tmp_path: Path) -> None:
+    file = tmp_path / "runs.jsonl"
+    with pytest.raises(SessionError, match=r"workers died in 25, seed 4.*resumes behind them"):
+        rows_of(cluster, file, cluster_work.deadly)
+    assert len(file.read_text().splitlines()) - 1 == len(CELLS) - 1
+
+
+def test_workers_have_to_see_the_folder_that_runs_write_into(
+    cluster: DaskCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Client(cluster.address) as client:
+        cluster_module._check_shared(client, tmp_path)
+        monkeypatch.setattr(cluster_module, "_sees", cluster_work.sees_nothing)
+        with pytest.raises(ConfigurationError, match="does not see this folder"):
+            cluster_module._check_shared(client, tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_worker_with_another_version_is_refused(cluster: DaskCluster, tmp_path: Path) -> None:
+    version = cluster_module.version()
+    cluster_module.version = lambda: "another"  # type: ignore[assignment]
+    try:
+        with pytest.raises(ConfigurationError, match=f"another version of the program, {version}"):
+            rows_of(cluster, tmp_path / "runs.jsonl", cluster_work.square)
+    finally:
+        cluster_module.version = lambda: version  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize(
+    ("threads", "version", "words"),
+    [
+        ([], distributed.__version__, r"has no workers.*dask worker tcp://there"),
+        ([1, 2], distributed.__version__, r"1 of 2 workers have several threads.*--nthreads 1"),
+        ([1], "1.0", r"the scheduler has distributed 1.0, this program \d"),
+    ],
+)
+def test_a_cluster_that_gives_other_results_is_refused(threads: list[int], version: str, words: str) -> None:
+    workers = {f"tcp://{number}": {"nthreads": each} for number, each in enumerate(threads)}
+    client: Any = SimpleNamespace(
+        get_versions=lambda check: {"scheduler": {"packages": {"distributed": version}}},
+        scheduler_info=lambda n_workers: {"workers": workers},
+        wait_for_workers=lambda number, timeout: None,
+    )
+    with pytest.raises(ConfigurationError, match=words):
+        cluster_module._check_cluster(client, "tcp://there")
+
+
+def test_a_scheduler_that_ends_ends_the_experiment(tmp_path: Path) -> None:
+    with DaskCluster(tmp_path, workers=1) as started:
+        settings = RunnerSettings(scheduler=started.address)
+        with pytest.raises(SessionError, match=r"scheduler has (ended|lost the runs)"):
+            run_cells(
+                "test", CELLS, cluster_work.square, tmp_path / "r.jsonl", settings, lambda *_: started.end_scheduler()
+            )
+
+
+@pytest.mark.long  # it is given time
+def test_no_scheduler_is_told_with_how_to_start_one(tmp_path: Path) -> None:
+    command = ["-m", "tactile_lab", "sweep", "--scheduler", "tcp://127.0.0.1:9", "--out", str(tmp_path)]
+    ended = subprocess.run([sys.executable, *command], capture_output=True, text=True, check=False)
+    assert ended.returncode == 2, ended.stderr
+    assert "no scheduler answers" in ended.stderr
+    assert "dask scheduler" in ended.stderr
+    assert "Traceback" not in ended.stderr

@@ -1,0 +1,79 @@
+"""How much of a shape was touched."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from drivers.core.contacts import Array
+from tactile_lab.experiments.data.outlines import OUTLINES_m
+from tactile_lab.slam.doubt.known_part import REACH_m, known_part, with_guesses_told
+from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+
+SQUARE_m = sample_polygon(1e-3 * np.array([[-45.0, -45.0], [45.0, -45.0], [45.0, 45.0], [-45.0, 45.0]]), 0.001)
+RIGHT, LEFT, TOP = ((np.array(normal), np.array(middle)) for normal, middle in (
+    ((1.0, 0.0), (0.045, 0.0)), ((-1.0, 0.0), (-0.045, 0.0)), ((0.0, 1.0), (0.0, 0.045))
+))  # fmt: skip
+
+
+def outline(sigma_m: float = 0.001) -> Contour:
+    return Contour(SQUARE_m, np.full(len(SQUARE_m), sigma_m), is_closed=True)
+
+
+def touched(*faces: tuple[Array, Array]) -> ContactSet:
+    along = np.linspace(-0.04, 0.04, 6)
+    points = [middle + step * np.array([-normal[1], normal[0]]) for normal, middle in faces for step in along]
+    normals = [normal for normal, _ in faces for _ in along]
+    count = len(points)
+    return ContactSet(np.array(points), np.array(normals), np.full(count, 0.001), np.full(count, 0.087))
+
+
+@pytest.mark.parametrize(
+    ("faces", "share"), [((RIGHT,), 0.25), ((RIGHT, LEFT), 0.5), ((RIGHT, TOP), 0.5), ((RIGHT, LEFT, TOP), 0.75)]
+)
+def test_a_contact_tells_of_its_own_face_only(faces: tuple[tuple[Array, Array], ...], share: float) -> None:
+    assert known_part(outline(), touched(*faces)).share == pytest.approx(share, abs=0.03)
+
+
+def test_nothing_is_known_without_contacts_or_where_the_shape_is_uncertain() -> None:
+    nothing = ContactSet(np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0))
+    assert known_part(outline(), nothing).share == 0.0
+    assert known_part(outline(sigma_m=0.006), touched(RIGHT, LEFT, TOP)).share == 0.0
+
+
+def test_a_guess_is_marked_and_has_no_small_sigma() -> None:
+    part = known_part(outline(), touched(RIGHT))
+    told = with_guesses_told(outline(), part)
+    assert told.known is not None
+    assert told.sigma_m[~told.known].min() == REACH_m
+    np.testing.assert_array_equal(told.sigma_m[told.known], 0.001)
+
+
+def test_simulated_grasps_all_around_know_the_whole_outline() -> None:
+    ellipse = OUTLINES_m["ellipse"]
+    normals = ellipse * [1.0, 25.0 / 9.0]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    every = slice(None, None, 12)
+    count = len(ellipse[every])
+    contacts = ContactSet(ellipse[every], normals[every], np.full(count, 0.001), np.full(count, 0.087))
+    shape = Contour(ellipse, np.full(len(ellipse), 0.001), is_closed=True)
+    assert known_part(shape, contacts).share > 0.95
+
+
+def test_a_standing_box_is_known_below_from_the_table_and_not_above() -> None:
+    box = trimesh.creation.box((0.06, 0.06, 0.06)).subdivide_to_size(0.01)
+    normals = np.asarray(box.face_normals)
+    mesh = SurfaceMesh(
+        np.asarray(box.triangles).reshape(-1, 3),
+        np.arange(3 * len(box.faces)).reshape(-1, 3),
+        np.full(3 * len(box.faces), 0.001),
+        np.repeat(normals, 3, axis=0),
+        is_closed=True,
+    )
+    sides = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    contacts = ContactSet(0.03 * sides, sides, np.full(4, 0.001), np.full(4, 0.087))
+    assert known_part(mesh, contacts, floor_m=-0.03).share == pytest.approx(5 / 6, abs=0.05)
+    assert known_part(mesh, contacts).share == pytest.approx(4 / 6, abs=0.05)

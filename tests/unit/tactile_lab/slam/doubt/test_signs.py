@@ -1,0 +1,88 @@
+"""Signs that a trajectory is wrong, each on a trajectory that is known to be right but for one thing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tactile_lab.slam.doubt.signs import signs
+from tactile_lab.slam.doubt.status import Doubt, status_of
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tests.support.simulated_contacts import true_map
+
+NOISE = MotionNoise()
+
+
+@pytest.fixture(scope="module")
+def true() -> ContactMap:
+    return true_map("rectangle", seed=4)
+
+
+def names(contact_map: ContactMap, **given: bool) -> set[str]:
+    return {doubt.name for doubt in signs(contact_map, NOISE, **given)}
+
+
+def turned(contact_map: ContactMap, grasps: slice, by: tuple[float, float, float]) -> ContactMap:
+    rows = contact_map.rows
+    rows[grasps] = contact_map.space.compose(rows[grasps], np.array(by))
+    return contact_map.with_rows(rows)
+
+
+def leaving_out(contact_map: ContactMap, grasps: range, contacts: int) -> ContactMap:
+    for index in grasps:
+        worse = replace(contact_map.placed[index], left_out=frozenset(range(contacts)))
+        contact_map = contact_map.with_placed(index, worse)
+    return contact_map
+
+
+def test_true_trajectories_have_no_signs() -> None:
+    found = [names(true_map(shape, seed)) for shape in ("rectangle", "L") for seed in range(10, 20)]
+    assert sum(map(bool, found)) <= 1
+
+
+def test_a_grasp_turned_the_wrong_way_round_needs_two_slips_that_undo_each_other(true: ContactMap) -> None:
+    found = signs(turned(true, slice(6, 7), (0.0, 0.0, 1.5)), NOISE)
+    undone = [doubt for doubt in found if doubt.name == "undone-slips"]
+    assert [doubt.grasps for doubt in undone] == [(6,)]
+    assert "grasp 7" in undone[0].words
+
+
+def test_a_slip_beyond_the_motion_model_is_told_once(true: ContactMap) -> None:
+    found = signs(turned(true, slice(6, None), (0.06, 0.0, 0.0)), NOISE)
+    assert [(doubt.name, doubt.grasps) for doubt in found] == [("unlikely-slip", (6,))]
+
+
+def test_a_jump_of_ten_centimetres_is_told(true: ContactMap) -> None:
+    assert names(turned(true, slice(6, None), (0.12, 0.0, 0.0))) == {"unlikely-slip", "jump"}
+    assert names(turned(true, slice(6, None), (0.12, 0.0, 0.0)), poses_given=True) == set()
+
+
+def test_contacts_that_fit_up_to_some_grasp_only_are_of_another_object(true: ContactMap) -> None:
+    (found,) = signs(leaving_out(true, range(7, 12), 3), NOISE)
+    assert (found.name, found.grasps) == ("other-object", (7, 8, 9, 10, 11))
+    assert names(leaving_out(true, range(1, 12, 3), 2)) == set()
+
+
+def test_wrong_contacts_of_the_first_grasp_are_told_and_two_are_grave(true: ContactMap) -> None:
+    for wrong in (1, 2):
+        (found,) = signs(leaving_out(true, range(1), wrong), NOISE)
+        assert (found.name, found.grave) == ("first-grasp", wrong == 2)
+
+
+@pytest.mark.parametrize(
+    ("share", "refused", "grave", "status"),
+    [
+        (0.95, 0.0, False, "complete"),
+        (0.62, 0.0, False, "partial"),
+        (None, 0.0, False, "partial"),
+        (0.95, 0.5, False, "partial"),
+        (0.62, 0.0, True, "ambiguous"),
+    ],
+)
+def test_the_worst_status_that_applies(share: float | None, refused: float, grave: bool, status: str) -> None:
+    doubts = [Doubt("jump", "the object jumps", grave=grave)]
+    assert status_of(lost=False, known_share=share, refused_share=refused, doubts=doubts) == status
+    assert status_of(lost=True, known_share=share, refused_share=refused, doubts=doubts) == "lost"
