@@ -17,6 +17,9 @@ VIRIDIS = np.array(
 """Eleven evenly spaced colours of the map, red green blue, 0 to 255."""
 
 
+SIGMA_FULL_m = 0.010
+"""Standard deviation at which a surface counts as unknown: the far end of the colour map."""
+
 UNKNOWN = np.array([150.0, 158.0, 170.0])
 """Where nothing is known: grey, red green blue."""
 

@@ -16,7 +16,6 @@ from drivers.camera.board_pose import board_pose
 from drivers.camera.boards import AnyBoard
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.frames import Image
-from drivers.camera.markers import seen_markers
 from drivers.core.contacts import Array
 
 LEAST_CORNERS = 8
@@ -73,10 +72,12 @@ def rough_lens(size_px: tuple[int, int]) -> CameraCalibration:
 
 def view_of(name: str, image: Image, board: AnyBoard) -> BoardView | str:
     """The view of a picture, or why it has none."""
-    blurs = [marker.blur_px for marker in seen_markers(image, board.dictionary).values()]
+    blurs = board.blurs_px(image)
     if not blurs:
-        return f"no marker of {board.dictionary} is visible"
-    if (blur := float(np.median(blurs))) > _LARGEST_BLUR_px:
+        return f"no {board.pattern} is visible"
+    if not (measured := [blur for blur in blurs if np.isfinite(blur)]):
+        return "no edge of its markers can be measured: too small, hidden in part, or without their white border"
+    if (blur := float(np.median(measured))) > _LARGEST_BLUR_px:
         return f"blurred: edges {blur:.1f} px wide, at most {_LARGEST_BLUR_px:g} px are accepted"
     points, pixels = board.match_corners(image)
     if len(points) < min(LEAST_CORNERS, board.point_count):

@@ -33,7 +33,6 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import rotation_angle_rad
 
-_UNKNOWNS = 13
 _MEDIAN_OF_THREE = float(chi2.median(3))
 _LEAST_rad, _LEAST_m = 1e-6, 1e-6
 _MOST_SIGMAS = 3.5
@@ -62,6 +61,8 @@ class PairProblem:
         known: what is known of them beforehand.
     """
 
+    unknowns = 13
+
     def __init__(self, pairs: Sequence[PosePair], known: PairNoise | None = None) -> None:
         self.pairs = tuple(pairs)
         self._scale_sigma = (known or PairNoise()).print_scale_sigma
@@ -69,12 +70,12 @@ class PairProblem:
         poses = [pair.mount_T_hand for pair in pairs], [pair.camera_T_target for pair in pairs]
         found = solve_ax_zb(*poses)
         self._closed = {"shah": found.mount_T_camera, "park_martin": solve_ax_xb(*poses).mount_T_camera}
-        self._start = gtsam.Values()
+        self._start = self.first_values()
         self._start.insert(MOUNT, found.mount_T_camera.inverse())
         self._start.insert(BOARD, found.hand_T_target)
         self._start.insert(SCALE, np.zeros(1))
         for _ in range(_ROUNDS):
-            self._noise = _noise_of([Pose3.Logmap(_off(pair, self._start)) for pair in pairs])
+            self._noise = _noise_of([Pose3.Logmap(_off(pair, self._start)) for pair in self.pairs_at(self._start)])
             measured = self._measurements(range(self.count))
             self._start = minimise(_without_gross(measured, self._start), self._start)
 
@@ -82,6 +83,23 @@ class PairProblem:
     def count(self) -> int:
         """Number of pairs."""
         return len(self.pairs)
+
+    def first_values(self) -> gtsam.Values:
+        """Where further unknowns start."""
+        return gtsam.Values()
+
+    def pairs_at(self, values: gtsam.Values) -> tuple[PosePair, ...]:
+        """The pairs, where they depend on further unknowns."""
+        return self.pairs
+
+    def measurement(self, index: int, noise: Array) -> Measurement:
+        """One pair as an observation, with the covariance of its residual, shape (6, 6)."""
+        pair = self.pairs[index]
+        return Measurement((MOUNT, BOARD, SCALE), noise, lambda values: evaluate_pair(pair, values))
+
+    def further_numbers(self, measured: Sequence[Measurement], values: gtsam.Values) -> dict[str, float]:
+        """What was found of further unknowns, by name."""
+        return {}
 
     def solve(self, keep: Sequence[int] | None = None, near: Solution | None = None) -> Solution:
         """The refined solution from all pairs, or from those in ``keep``.
@@ -94,7 +112,7 @@ class PairProblem:
         measured, everything = _without_gross(measured, values), measured
         share, sigma = float(values.atVector(SCALE)[0]), float(np.sqrt(marginal(measured, values, SCALE)[0, 0]))
         _refuse_contradiction(share, sigma, self._scale_sigma)
-        factor = variance_factor(measured, values, _UNKNOWNS)
+        factor = variance_factor(measured, values, self.unknowns)
         return Solution(
             world_T_mount=values.atPose3(MOUNT),
             covariance=max(factor, 1.0) * marginal(measured, values, MOUNT),
@@ -102,7 +120,12 @@ class PairProblem:
             variance_factor=factor,
             values=values,
             others={"hand_T_target": values.atPose3(BOARD)},
-            numbers={"print_larger_share": share, "print_larger_sigma": sigma, **self._beside(values)},
+            numbers={
+                "print_larger_share": share,
+                "print_larger_sigma": sigma,
+                **self.further_numbers(measured, values),
+                **self._beside(values),
+            },
             outliers=tuple(index for index in outliers(everything, values) if index < len(everything) - 1),
         )
 
@@ -114,11 +137,11 @@ class PairProblem:
         return away | {f"{name}_deg_away": float(np.degrees(rotation_angle_rad(off))) for name, off in offs.items()}
 
     def _measurements(self, chosen: Sequence[int]) -> list[Measurement]:
-        return [*(_measurement(self.pairs[index], self._noise) for index in chosen), self._prior]
+        return [*(self.measurement(index, self._noise) for index in chosen), self._prior]
 
     def residuals(self, solution: Solution) -> tuple[PoseResidual, ...]:
         """Residual of each pair."""
-        offs = [_off(pair, solution.values) for pair in self.pairs]
+        offs = [_off(pair, solution.values) for pair in self.pairs_at(solution.values)]
         return tuple(
             PoseResidual(f"pair {index + 1}", float(np.linalg.norm(off.translation())), rotation_angle_rad(off))
             for index, off in enumerate(offs)
@@ -166,14 +189,11 @@ def _prior_of_scale(sigma: float) -> Measurement:
     return Measurement((SCALE,), np.array([[sigma**2]]), evaluate, robust=False)
 
 
-def _measurement(pair: PosePair, noise: Array) -> Measurement:
-    def evaluate(values: gtsam.Values) -> tuple[Array, list[Array]]:
-        off = _off(pair, values)
-        residual = Pose3.Logmap(off)
-        turned = Pose3.LogmapDerivative(off)
-        slope = -turned @ off.inverse().AdjointMap()
-        by_mount = slope @ (pair.mount_T_hand * values.atPose3(BOARD)).inverse().AdjointMap()
-        by_scale = turned[:, 3:] @ pair.camera_T_target.rotation().unrotate(pair.camera_T_target.translation())
-        return residual, [by_mount, slope, by_scale[:, None]]
-
-    return Measurement((MOUNT, BOARD, SCALE), noise, evaluate)
+def evaluate_pair(pair: PosePair, values: gtsam.Values) -> tuple[Array, list[Array]]:
+    """Residual of a pair, shape (6,), and its derivatives by mount, board and scale."""
+    off = _off(pair, values)
+    turned = Pose3.LogmapDerivative(off)
+    slope = -turned @ off.inverse().AdjointMap()
+    by_mount = slope @ (pair.mount_T_hand * values.atPose3(BOARD)).inverse().AdjointMap()
+    by_scale = turned[:, 3:] @ pair.camera_T_target.rotation().unrotate(pair.camera_T_target.translation())
+    return Pose3.Logmap(off), [by_mount, slope, by_scale[:, None]]

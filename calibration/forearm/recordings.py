@@ -10,19 +10,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from gtsam import Pose3, Rot3
+from gtsam import Pose3
 from pydantic import Field, RootModel
 
-from calibration.forearm.hand_eye import nearest_rotation
+from calibration.forearm.pose_streams import STREAMS_FORMAT, Matrix, PoseStreams, read_streams, rigid_pose
 from calibration.steps.observations import HandPose, Plane, PosePair, Spot, Target, Touch, View
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.markers import MarkerSettings
 from drivers.core.atomic_files import write_whole
 from drivers.core.configuration import StrictModel, validate
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import FINGERS
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform, Vector3
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
@@ -35,8 +35,6 @@ Six = tuple[float, float, float, float, float, float]
 Joints = Annotated[tuple[float, ...], Field(min_length=len(JOINTS), max_length=len(JOINTS))]
 Square3 = tuple[Vector3, Vector3, Vector3]
 Pixel = tuple[float, float]
-
-_SKEWED = 1e-3
 
 
 class PlaneEntry(StrictModel):
@@ -95,14 +93,6 @@ class DataFile(StrictModel):
     markers: MarkerSettings | None = None
 
 
-Matrix: TypeAlias = tuple[
-    tuple[float, float, float, float],
-    tuple[float, float, float, float],
-    tuple[float, float, float, float],
-    tuple[float, float, float, float],
-]
-
-
 class _Pairs(RootModel[tuple[tuple[Matrix, Matrix], ...]]):
     """Pose pairs as other programs write them."""
 
@@ -114,7 +104,7 @@ class ForearmData:
     Attributes:
         rig, devices: what they were recorded on; empty if unknown.
         guess: approximate pose of the mount.
-        touches, views, pairs: one of them.
+        touches, views, pairs, streams: one of them; pairs too for streams, at the offset that their motion suggests.
         link: what carries the board in the views.
         camera, markers: lens and world marker of the views.
     """
@@ -125,6 +115,7 @@ class ForearmData:
     touches: tuple[Touch, ...] = ()
     views: tuple[View, ...] = ()
     pairs: tuple[PosePair, ...] = ()
+    streams: PoseStreams | None = None
     link: str = "palm"
     camera: CameraCalibration | None = None
     markers: MarkerSettings | None = None
@@ -140,8 +131,11 @@ def load_data(path: Path) -> ForearmData:
     content = _json(path)
     if isinstance(content, list):
         return ForearmData(pairs=_pairs(validate(content, _Pairs, where=str(path)).root, str(path)))
+    if isinstance(content, dict) and content.get("format") == STREAMS_FORMAT:
+        streams = read_streams(content, str(path))
+        return ForearmData(pairs=streams.pairs_at(streams.first_delay_s), streams=streams)
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        hint = f"Give a file with format {FORMAT}, or a list of pairs of 4 x 4 matrices"
+        hint = f"Give a file with format {FORMAT} or {STREAMS_FORMAT}, or a list of pairs of 4 x 4 matrices"
         raise ConfigurationError("contains no known kind of observations", where=str(path), hint=hint)
     file = validate(content, DataFile, where=str(path))
     if bool(file.touches) == bool(file.views):
@@ -189,19 +183,9 @@ def _json(path: Path) -> Any:
 
 def _pairs(matrices: Sequence[tuple[Matrix, Matrix]], where: str) -> tuple[PosePair, ...]:
     return tuple(
-        PosePair(
-            _rigid(np.array(hand), f"{where}: pair {index + 1}"), _rigid(np.array(target), f"{where}: pair {index + 1}")
-        )
+        PosePair(rigid_pose(hand, f"{where}: pair {index + 1}"), rigid_pose(target, f"{where}: pair {index + 1}"))
         for index, (hand, target) in enumerate(matrices)
     )
-
-
-def _rigid(matrix: Array, where: str) -> Pose3:
-    rotation = nearest_rotation(matrix[:3, :3])
-    if np.abs(rotation - matrix[:3, :3]).max() > _SKEWED or np.abs(matrix[3] - [0, 0, 0, 1]).max() > _SKEWED:
-        hint = "Give 4 x 4 matrices of a rotation and a translation in metres"
-        raise ConfigurationError("a matrix is not a rigid motion", where=where, hint=hint)
-    return Pose3(Rot3(rotation), matrix[:3, 3])
 
 
 def _touch(entry: TouchEntry) -> Touch:

@@ -14,6 +14,7 @@ from pydantic import Field
 from calibration.forearm.board_problem import BoardNoise, BoardProblem
 from calibration.forearm.pair_problem import PairNoise, PairProblem
 from calibration.forearm.recordings import ForearmData
+from calibration.forearm.stream_problem import StreamProblem
 from calibration.forearm.touch_plan import PlannedTouch
 from calibration.forearm.touch_problem import TouchNoise, TouchProblem
 from calibration.forearm.view_plan import PlannedView
@@ -151,6 +152,8 @@ def problem_of(data: ForearmData, settings: WizardSettings) -> Problem:
     """The problem for some data. Raises ConfigurationError if something is missing."""
     if data.touches:
         return TouchProblem(data.touches, settings.touch, data.guess)
+    if data.streams is not None:
+        return StreamProblem(data.streams, settings.pairs)
     if data.pairs:
         return PairProblem(data.pairs, settings.pairs)
     if data.camera is None or data.markers is None:

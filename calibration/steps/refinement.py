@@ -19,7 +19,7 @@ from scipy.stats import chi2
 
 from drivers.core.contacts import Array
 
-MOUNT, OFFSETS, BOARD, CAMERA, SCALE = (gtsam.symbol(letter, 0) for letter in "xjycs")
+MOUNT, OFFSETS, BOARD, CAMERA, SCALE, DELAY = (gtsam.symbol(letter, 0) for letter in "xjycsd")
 
 Evaluation: TypeAlias = Callable[[gtsam.Values], tuple[Array, list[Array]]]
 """Residual, shape (m,), and its derivatives by each key, each (m, size of the key)."""

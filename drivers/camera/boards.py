@@ -1,7 +1,8 @@
 """Printed boards: single markers, grids of markers and ChArUco boards, and their corners in a picture.
 
-All three share one frame: x to the right and y up on the print, z out of it, origin in the print's *middle*. The origin
-of OpenCV's boards is their top left corner, with y down; this module alone converts between the frames.
+All boards, those in :mod:`drivers.camera.targets` too, share one frame: x to the right and y up on the print, z out of
+it, origin in the print's *middle*. The origin of OpenCV's boards is their top left corner, with y down;
+this module alone converts between the frames.
 """
 
 from __future__ import annotations
@@ -12,62 +13,20 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 import cv2
 import numpy as np
-from pydantic import Field, RootModel, field_validator, model_validator
+from pydantic import Field, RootModel, model_validator
 
 from drivers.camera.frames import Image
-from drivers.camera.markers import detect, dictionary_or_file, opencv_dictionary
-from drivers.core.configuration import StrictModel, load, validate
+from drivers.camera.markers import detect
+from drivers.camera.targets.april_grid import AprilGrid
+from drivers.camera.targets.chessboard import Chessboard
+from drivers.camera.targets.kalibr_target import board_of_kalibr
+from drivers.camera.targets.printed import MarkerPrint
+from drivers.core.configuration import load, validate
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 
-CHECK_BAR_mm, LARGEST_SCALE_ERROR = 100.0, 0.005
 
-
-class Printed(StrictModel):
-    """Properties common to all prints.
-
-    Attributes:
-        dictionary: OpenCV's name of the dictionary of its markers, or a file with one in OpenCV's form.
-        measured_bar_mm: length of the print's check bar, measured with a ruler or caliper; it should be 100 mm. None if
-            it was not measured.
-    """
-
-    dictionary: str = "DICT_4X4_50"
-    measured_bar_mm: float | None = None
-
-    @field_validator("dictionary")
-    @classmethod
-    def _known(cls, value: str) -> str:
-        return dictionary_or_file(value)
-
-    @field_validator("measured_bar_mm")
-    @classmethod
-    def _true_to_scale(cls, value: float | None) -> float | None:
-        if value is not None and abs(value / CHECK_BAR_mm - 1.0) > LARGEST_SCALE_ERROR:
-            share = 100.0 * (value / CHECK_BAR_mm - 1.0)
-            problem = (
-                f"the {CHECK_BAR_mm:g} mm check bar measures {value:g} mm: {share:+.1f} %, at most 0.5 % are allowed"
-            )
-            raise ValueError(f"{problem}. Print at 100 % (actual size), without fitting to the page")
-        return value
-
-    @property
-    def scale(self) -> float:
-        """True size divided by intended size; 1 if the bar was not measured."""
-        return (self.measured_bar_mm or CHECK_BAR_mm) / CHECK_BAR_mm
-
-    @cached_property
-    def opencv_dictionary(self) -> Any:
-        """The OpenCV dictionary object."""
-        return opencv_dictionary(self.dictionary)
-
-    def _check_numbers(self, largest: int) -> None:
-        count = len(self.opencv_dictionary.bytesList)
-        if largest >= count:
-            raise ValueError(f"{self.dictionary} has markers 0 to {count - 1}, not {largest}")
-
-
-class SingleMarker(Printed):
+class SingleMarker(MarkerPrint):
     """One marker; ``side_m`` is the intended side length of its black square."""
 
     kind: Literal["single"] = "single"
@@ -99,7 +58,7 @@ class SingleMarker(Printed):
         return corners, found[self.number]
 
 
-class GridBoard(Printed):
+class GridBoard(MarkerPrint):
     """Markers in rows and columns with gaps between, numbered row by row from ``first_number``."""
 
     kind: Literal["grid"] = "grid"
@@ -145,7 +104,7 @@ class GridBoard(Printed):
         return np.asarray(self.scale * (square + np.array([left, top, 0.0])))
 
 
-class CharucoBoard(Printed):
+class CharucoBoard(MarkerPrint):
     """A chessboard with markers in its white squares; the corners between squares are measured.
 
     Attributes:
@@ -207,19 +166,21 @@ class CharucoBoard(Printed):
         return cv2.aruco.CharucoDetector(self.opencv_board)
 
 
-AnyBoard: TypeAlias = SingleMarker | GridBoard | CharucoBoard
+AnyBoard: TypeAlias = SingleMarker | GridBoard | CharucoBoard | AprilGrid | Chessboard
 Board: TypeAlias = Annotated[AnyBoard, Field(discriminator="kind")]
 
 
 class _BoardFile(RootModel[Board]):
-    """A board as stored in a file; its ``kind`` says which of the three it is."""
+    """A board as stored in a file; its ``kind`` says which of the five it is."""
 
 
 def load_board(path: Path) -> AnyBoard:
-    """Read a board's description written by ``tactile-lab markers``. Raises ConfigurationError."""
+    """Read a board's description, written by ``tactile-lab markers`` or for Kalibr. Raises ConfigurationError."""
     content = load(path)
     if not isinstance(content, dict):
         raise ConfigurationError(
             "is not a description of a board", where=str(path), hint="Create one with: tactile-lab markers"
         )
+    if "target_type" in content:
+        content = board_of_kalibr(content, str(path))
     return validate(content, _BoardFile, where=str(path)).root

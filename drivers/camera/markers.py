@@ -140,19 +140,21 @@ class MarkerPose:
 
 
 @lru_cache(maxsize=8)
-def _detector(dictionary: str) -> Any:
+def _detector(dictionary: str, border_modules: int) -> Any:
     parameters = cv2.aruco.DetectorParameters()
+    parameters.markerBorderBits = border_modules
     parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
     return cv2.aruco.ArucoDetector(opencv_dictionary(dictionary), parameters)
 
 
-def seen_markers(image: Image, dictionary: str) -> dict[int, SeenMarker]:
+def seen_markers(image: Image, dictionary: str, border_modules: int = 1) -> dict[int, SeenMarker]:
     """Markers in a picture by number, with their blur and with corners accurate to a few hundredths of a pixel.
 
-    A number that is seen more than once is left out, since the right one cannot be known.
+    A number that is seen more than once is left out, since the right one cannot be known. ``border_modules`` is the
+    width of the markers' black frame: 1, or 2 in AprilGrids.
     """
-    modules = opencv_dictionary(dictionary).markerSize + 2
-    found = coarse_markers(image, dictionary)
+    modules = opencv_dictionary(dictionary).markerSize + 2 * border_modules
+    found = coarse_markers(image, dictionary, border_modules)
     return {number: refine_square(image, corners, modules) for number, corners in found.items()}
 
 
@@ -161,9 +163,9 @@ def detect(image: Image, dictionary: str) -> dict[int, Array]:
     return {number: marker.corners_px for number, marker in seen_markers(image, dictionary).items()}
 
 
-def coarse_markers(image: Image, dictionary: str) -> dict[int, Array]:
+def coarse_markers(image: Image, dictionary: str, border_modules: int = 1) -> dict[int, Array]:
     """As :func:`detect`, with corners refined by OpenCV: accurate to about a quarter of a pixel."""
-    corners, numbers, _ = _detector(dictionary).detectMarkers(image)
+    corners, numbers, _ = _detector(dictionary, border_modules).detectMarkers(image)
     found = [] if numbers is None else [int(number) for number in np.ravel(numbers)]
     quads = [np.asarray(quad, float).reshape(4, 2) for quad in corners]
     return {number: quad for number, quad in zip(found, quads, strict=True) if found.count(number) == 1}

@@ -19,6 +19,7 @@ from calibration.forearm.wizard import Observation, Planned
 from calibration.steps.observations import HandPose, Touch, View
 from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker
 from drivers.camera.markers import MarkerSettings, detect
+from drivers.camera.targets.april_grid import AprilGrid
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
@@ -30,7 +31,7 @@ from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
 ObservedT = TypeVar("ObservedT")
-Board = SingleMarker | GridBoard | CharucoBoard
+Board = SingleMarker | GridBoard | CharucoBoard | AprilGrid
 
 
 class MeasurerSettings(StrictModel):

@@ -70,12 +70,12 @@ class Recorder:
         self.broken = False
         """Whether a message could not be stored and the error was raised: later messages are not recorded."""
         self._sink = sink
-        self._onlooker: TrafficSink = NullTraffic()
+        self._onlookers: list[TrafficSink] = []
         self._next_state_ns: int | None = None
 
     def add_onlooker(self, onlooker: TrafficSink) -> None:
         """From now on viewers' topics also go to ``onlooker``; its ``write`` must be quick and never raise."""
-        self._onlooker = onlooker
+        self._onlookers.append(onlooker)
 
     # --- what a replay needs -----------------------------------------------------------------------------------
 
@@ -213,7 +213,8 @@ class Recorder:
     def _put_json(self, topic: str, content: foxglove.Json, stamp_ns: int) -> None:
         data = schemas.encode(content)
         self._put(topic, data, stamp_ns)
-        self._onlooker.write(topic, data, stamp_ns)
+        for onlooker in self._onlookers:
+            onlooker.write(topic, data, stamp_ns)
 
 
 class NullRecorder(Recorder):

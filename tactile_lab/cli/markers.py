@@ -19,6 +19,8 @@ KINDS = {
     "single": {"number", "dictionary", "side_m"},
     "grid": {"dictionary", "columns", "rows", "side_m", "gap_m"},
     "charuco": {"dictionary", "columns", "rows", "square_m", "marker_m"},
+    "chessboard": {"columns", "rows", "square_m"},
+    "aprilgrid": {"dictionary", "columns", "rows", "side_m", "gap_m"},
     "rig": set[str](),
 }
 """What can be printed, and the options of each; for rig markers the rig file has them."""
@@ -29,17 +31,22 @@ def markers(
         str,
         typer.Argument(
             metavar="WHAT",
-            help="single, grid, charuco or rig; or the .yaml file of a print, to store its measured check bar.",
+            help="single, grid, charuco, chessboard, aprilgrid or rig; or the .yaml file of a print, to store its "
+            "measured check bar.",
         ),
     ],
     number: Annotated[list[int] | None, typer.Option(help="Number (ID) of a single marker. Can be repeated.")] = None,
     side_mm: Annotated[
-        float | None, typer.Option(help="Side length of a marker's black square (single, grid).")
+        float | None, typer.Option(help="Side length of a marker's black square (single, grid, aprilgrid).")
     ] = None,
-    columns: Annotated[int | None, typer.Option(help="Number of columns of a grid or ChArUco board.")] = None,
-    rows: Annotated[int | None, typer.Option(help="Number of rows of a grid or ChArUco board.")] = None,
-    gap_mm: Annotated[float | None, typer.Option(help="Gap between the markers of a grid.")] = None,
-    square_mm: Annotated[float | None, typer.Option(help="Side length of a ChArUco board's squares.")] = None,
+    columns: Annotated[int | None, typer.Option(help="Number of columns of a board.")] = None,
+    rows: Annotated[int | None, typer.Option(help="Number of rows of a board.")] = None,
+    gap_mm: Annotated[
+        float | None, typer.Option(help="Gap between the markers of a grid, or the tags of an AprilGrid.")
+    ] = None,
+    square_mm: Annotated[
+        float | None, typer.Option(help="Side length of a chessboard's or ChArUco board's squares.")
+    ] = None,
     marker_mm: Annotated[float | None, typer.Option(help="Side length of a ChArUco board's markers.")] = None,
     dictionary: Annotated[
         str | None, typer.Option(help="OpenCV name of the marker dictionary, such as DICT_4X4_50.")
@@ -126,9 +133,12 @@ def _board_sheet(
 
 def _board(kind: str, content: dict[str, Any]) -> AnyBoard:
     from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker
+    from drivers.camera.targets.april_grid import AprilGrid
+    from drivers.camera.targets.chessboard import Chessboard
     from drivers.core.configuration import validate
 
-    models: dict[str, type[AnyBoard]] = {"single": SingleMarker, "grid": GridBoard, "charuco": CharucoBoard}
+    kinds: tuple[type[AnyBoard], ...] = (SingleMarker, GridBoard, CharucoBoard, Chessboard, AprilGrid)
+    models = {model.model_fields["kind"].default: model for model in kinds}
     return validate(content, models[kind], where="markers", hint="Change the options")
 
 

@@ -89,7 +89,8 @@ def require_right_hand(rig: Rig) -> None:
     if (form := hand_form(rig)) != RIGHT_HAND:
         what = f"has a {form}: calibrations that move the hand are made for right hands with five fingers and a wrist"
         hint = (
-            "Measure the forearm's pose (calibrate forearm --method manual); keep the delivered joints and fingertips"
+            "Measure the forearm's pose by ruler (calibrate forearm --method manual) or give another program's pose "
+            "pairs (--from); keep the delivered joints and fingertips"
         )
         raise ConfigurationError(what, where=rig.source, hint=hint)
 

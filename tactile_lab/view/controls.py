@@ -13,9 +13,9 @@ from viser import Icon, IconName
 
 from drivers.core.contacts import FINGERS
 from sessions.guided.operator import Ask
-from tactile_lab.colours import hex_colour, viridis
+from tactile_lab.colours import SIGMA_FULL_m, hex_colour, viridis
 from tactile_lab.view.plots import Plots
-from tactile_lab.view.scene import Scene, SIGMA_FULL_m
+from tactile_lab.view.scene import Scene
 
 Press = Callable[[Ask, str], None]
 """Called with the request of a pressed button and a text."""

@@ -13,8 +13,9 @@ from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import CLOSINGS, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.recording.traffic import foxglove
-from tactile_lab.colours import viridis
-from tactile_lab.view.scene import Scene, ShownSurface, SIGMA_FULL_m, ellipse
+from tactile_lab.colours import SIGMA_FULL_m, viridis
+from tactile_lab.outline_walls import wall
+from tactile_lab.view.scene import Scene, ShownSurface, ellipse
 from tactile_lab.view.skeleton import TIP_CENTRE_m, bones, shown_form
 
 TIP_RADIUS_m = 0.0085
@@ -225,7 +226,7 @@ def patches(surface: ShownSurface) -> list[Patch]:
     """
     vertices_m, faces, sigma_m = surface.vertices_m, surface.faces, surface.sigma_m
     if surface.dimension == 2:
-        vertices_m, faces, sigma_m = _wall(vertices_m, surface.origin_height_m, sigma_m)
+        vertices_m, faces, sigma_m = wall(vertices_m, surface.origin_height_m, sigma_m)
     shares = np.clip(sigma_m[faces].mean(axis=1) / SIGMA_FULL_m, 0.0, 1.0)
     steps = np.rint(shares * (COLOURS - 1)).astype(int)
     colours = viridis(np.linspace(0.0, 1.0, COLOURS))
@@ -237,15 +238,6 @@ def _patch_of(vertices_m: Array, faces: Any, colour: Any) -> Patch:
     used, renumbered = np.unique(faces, return_inverse=True)
     red, green, blue = (int(channel) for channel in colour)
     return Patch(vertices_m[used], renumbered.reshape(-1, 3), (red, green, blue))
-
-
-def _wall(outline_m: Array, half_height_m: float, sigma_m: Array) -> tuple[Array, Any, Array]:
-    count, up = len(outline_m), half_height_m * _UP
-    here, after = np.arange(count), np.roll(np.arange(count), -1)
-    faces = np.vstack(
-        [np.column_stack([here, after, after + count]), np.column_stack([here, after + count, here + count])]
-    )
-    return np.vstack([outline_m - up, outline_m + up]), faces, np.concatenate([sigma_m, sigma_m])
 
 
 def fading(ages: Array) -> Any:

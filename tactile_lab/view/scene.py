@@ -21,8 +21,6 @@ WIZARD_TOPIC = "/wizard"
 """Topic of a calibration wizard's panel; only for a page, not recorded."""
 MESSAGES = 6
 """Number of log events shown."""
-SIGMA_FULL_m = 0.010
-"""Standard deviation at which a surface counts as unknown: the far end of the colour map."""
 
 
 @dataclass(frozen=True)

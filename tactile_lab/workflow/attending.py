@@ -31,7 +31,7 @@ class Attendance:
         led_by: how the hand is moved in a guided session; None for what the rig says.
         automatic: captures come by themselves; None for what the rig says.
         pace: simulated seconds for a real one in a guided session; 0 for as fast as it goes.
-        onlooker: is given what viewers show.
+        onlookers: are given what viewers show.
         approve: asked before every grasp of an autonomous session.
     """
 
@@ -40,7 +40,7 @@ class Attendance:
     led_by: Literal["keys", "hand"] | None = None
     automatic: bool | None = None
     pace: float = 1.0
-    onlooker: TrafficSink | None = None
+    onlookers: tuple[TrafficSink, ...] = ()
     approve: Approve = approve_everything
 
 

@@ -14,6 +14,7 @@ from drivers.camera.markers import other_dictionary
 from drivers.camera.pictures import Picture
 from drivers.camera.source_settings import CameraSourceSettings
 from drivers.camera.sources import open_source
+from drivers.camera.targets.chessboard import Chessboard
 from drivers.core.clock import Clock
 from drivers.core.errors import ConfigurationError
 
@@ -100,9 +101,10 @@ def _take(found: Gathering, picture: Picture, board: AnyBoard) -> bool:
 
 
 def _nothing_found(source: str, board: AnyBoard, last: Image | None, found: Gathering) -> ConfigurationError:
-    other = None if last is None else other_dictionary(last, board.dictionary)
+    described = board.kind if isinstance(board, Chessboard) else board.dictionary
+    other = None if last is None else other_dictionary(last, described)
     if other is not None:
-        what = f"the pictures show markers of {other}, but the board is described with {board.dictionary}"
+        what = f"the pictures show markers of {other}, but the board is described with {described}"
         return ConfigurationError(what, where=source, hint="Give the description of this board with --board")
     reasons = sorted(set(found.refused.values()))
     what = f"none of the {found.pictures} pictures shows the board ({'; '.join(reasons[:3])})"

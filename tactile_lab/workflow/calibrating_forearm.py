@@ -20,6 +20,7 @@ from calibration.steps.geometry import load_geometry
 from drivers.camera.boards import GridBoard, load_board
 from drivers.camera.calibration import load_camera
 from drivers.camera.markers import MarkerSettings
+from drivers.camera.targets.chessboard import Chessboard
 from drivers.core.configuration import StrictModel, load_model
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform
@@ -126,11 +127,15 @@ def _upright(semi_axes_m: tuple[float, float, float], distal_T_tip: Pose3) -> Ti
 
 
 def hand_board(rig: Rig, request: ForearmRequest) -> Board:
-    """The board on the hand. Raises ConfigurationError when none is named."""
+    """The board on the hand. Raises ConfigurationError when none is named, or a chessboard."""
     if request.board is None and "board" not in rig.files:
         hint = "Print one with tactile-lab markers, glue it to the palm, and give its file with --board"
         raise ConfigurationError("no board on the hand is given", where=rig.source, hint=hint)
-    return load_board(request.board or rig.files["board"])
+    file = request.board or rig.files["board"]
+    if isinstance(board := load_board(file), Chessboard):
+        hint = "Print another one for the hand: tactile-lab markers grid"
+        raise ConfigurationError("a chessboard does not tell which way up it is", where=str(file), hint=hint)
+    return board
 
 
 def _plan(rig: Rig, request: ForearmRequest) -> tuple[Planned, ...]:

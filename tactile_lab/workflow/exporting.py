@@ -1,4 +1,4 @@
-"""A session as a contact log, for other programs and for :mod:`tactile_lab.workflow.reconstructing`."""
+"""A session as files of other programs; as a contact log also for :mod:`tactile_lab.workflow.reconstructing`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Contact
 from drivers.core.errors import SessionError
+from drivers.core.installed.extras import require_package
 from sessions.exchange.archives import export_archive
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from sessions.exchange.sample_tables import SampleTables, read_tables
@@ -121,10 +122,51 @@ def export_hdf5(session: Session, path: Path) -> int:
 
 
 def export_rosbag(session: Session, folder: Path) -> int:
-    """All samples as a ROS 2 bag; gives their number. Raises SessionError, or ConfigurationError without rosbags."""
-    from sessions.exchange.ros_bag import write_ros_bag
+    """Frames, markers and all samples as a ROS 2 bag; gives its messages. Raises SessionError, or ConfigurationError
+    without rosbags.
+    """
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.ros_bag import write_ros_bag
 
-    return write_ros_bag(_tables(session), folder)
+    items = RecordedItems(session)
+    return write_ros_bag(folder, items.robot, items, _tables(session))
+
+
+def export_foxglove(session: Session, path: Path) -> int:
+    """What viewers show as an MCAP file of Foxglove's types; gives its messages. Raises SessionError, or
+    ConfigurationError without foxglove-sdk.
+    """
+    require_package("foxglove")
+    from tactile_lab.viewers.foxglove_file import write_foxglove
+    from tactile_lab.viewers.recorded_items import RecordedItems
+
+    manifest = session.manifest
+    facts = {"session": manifest.name, "rig": manifest.rig, "object": manifest.object_name}
+    return write_foxglove(path, RecordedItems(session), facts)
+
+
+def export_rerun(session: Session, path: Path) -> int:
+    """What viewers show as a recording of Rerun; gives its items. Raises SessionError, or ConfigurationError without
+    rerun-sdk.
+    """
+    require_package("rerun")
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.rerun_file import write_rerun
+
+    return write_rerun(path, RecordedItems(session), session.manifest.name)
+
+
+def show_rerun(session: Session, address: str) -> int:
+    """Send what viewers show to Rerun's viewer at an address, or to a new one; gives its items.
+
+    Raises:
+        ConfigurationError: rerun-sdk is not installed, or the viewer cannot be reached.
+    """
+    require_package("rerun")
+    from tactile_lab.viewers.recorded_items import RecordedItems
+    from tactile_lab.viewers.rerun_file import show_in_rerun
+
+    return show_in_rerun(RecordedItems(session), session.manifest.name, address)
 
 
 def _tables(session: Session) -> SampleTables:
@@ -162,9 +204,19 @@ EXPORTS: Mapping[str, Callable[[Session, Path], int]] = {
     "csv": export_csv,
     "hdf5": export_hdf5,
     "rosbag": export_rosbag,
+    "foxglove": export_foxglove,
+    "rerun": export_rerun,
     "tum": export_tum,
     "archive": export_archive,
 }
 """Ways to write a whole session, by name."""
-UNITS = {"csv": "rows", "hdf5": "rows", "rosbag": "messages", "tum": "poses", "archive": "files"}
+UNITS = {
+    "csv": "rows",
+    "hdf5": "rows",
+    "rosbag": "messages",
+    "foxglove": "messages",
+    "rerun": "entries",
+    "tum": "poses",
+    "archive": "files",
+}
 """What each of them counts."""

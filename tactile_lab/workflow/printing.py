@@ -8,10 +8,11 @@ from pathlib import Path
 
 import yaml
 
-from drivers.camera.boards import AnyBoard, CHECK_BAR_mm, SingleMarker, load_board
+from drivers.camera.boards import AnyBoard, SingleMarker, load_board
 from drivers.camera.markers import MarkerSettings
 from drivers.camera.printing.print_files import pdf_bytes, svg_text
 from drivers.camera.printing.print_layout import Sheet, sheet_of
+from drivers.camera.targets.printed import CHECK_BAR_mm
 from drivers.core.atomic_files import write_whole
 from drivers.core.calibration_file import load_parameters
 from drivers.core.configuration import StrictModel, validate

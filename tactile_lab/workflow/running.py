@@ -152,8 +152,8 @@ def _record(
 ) -> SessionOutcome:
     """Connect, grasp until done, disconnect; the session is closed in any case."""
     with session:
-        if attendance.onlooker is not None:
-            session.recorder.add_onlooker(attendance.onlooker)
+        for onlooker in attendance.onlookers:
+            session.recorder.add_onlooker(onlooker)
         runtime = laboratory.runtime(session.recorder)
         runtime.tell_problems_to(progress.on_message)
         settings = settings_for(_conductor_settings(rig, request), attendance)

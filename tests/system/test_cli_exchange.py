@@ -17,6 +17,7 @@ import pytest
 import trimesh
 import yaml
 from gtsam import Pose3
+from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from drivers.core.contacts import Grasp
@@ -160,26 +161,35 @@ def piece(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_session_is_exported_in_every_form_and_opens_in_programs_that_are_not_ours(inside, piece, tmp_path):
-    forms = {"csv": "tables", "hdf5": "all.h5", "rosbag": "bag", "archive": "all.zip"}
+    forms = {
+        "csv": "tables", "hdf5": "all.h5", "rosbag": "bag", "foxglove": "all.mcap", "rerun": "all.rrd",
+        "archive": "all.zip",
+    }  # fmt: skip
     options = [word for form, name in forms.items() for word in (f"--{form}", tmp_path / name)]
     answer = inside("session", "export", piece, *options, "--json")
     assert answer.code == 0, answer.err
     told = json.loads(answer.out)
     assert all(told[form] == str(tmp_path / name) for form, name in forms.items())
-    assert told["csv_written"] == told["hdf5_written"] == told["rosbag_written"] > 300
+    assert told["rosbag_written"] > told["csv_written"] == told["hdf5_written"] > 300
     with (tmp_path / "tables" / "joints.csv").open(newline="") as file:
         lines = sum(1 for _ in csv.DictReader(file))
     with h5py.File(tmp_path / "all.h5") as file:
         assert len(file["joints/stamp_ns"]) == lines
     with AnyReader([tmp_path / "bag"]) as bag:
-        assert sum(1 for _ in bag.messages([c for c in bag.connections if c.topic == "/joints"])) == lines
+        kinds = {c.topic: c.msgcount for c in bag.connections}
+        assert kinds["/joint_states"] == lines + (len((tmp_path / "tables" / "base.csv").read_text().splitlines()) - 1)
+        assert {"/tf", "/tf_static", "/robot_description"} <= set(kinds)
+    with (tmp_path / "all.mcap").open("rb") as file:
+        found = make_reader(file, validate_crcs=True).get_summary()
+    states = {c.topic: found.statistics.channel_message_counts[number] for number, c in found.channels.items()}
+    assert states["/joint_states"] == states["/tf"] == 7  # an extract keeps bytes only: they come from those
     with zipfile.ZipFile(tmp_path / "all.zip") as archive:
         assert archive.testzip() is None
     for form, name in forms.items():
         refused(inside("session", "export", piece, f"--{form}", tmp_path / name), 2, name, "exists already")
 
 
-@pytest.mark.parametrize("form", ["csv", "hdf5", "rosbag", "archive"])
+@pytest.mark.parametrize("form", ["csv", "hdf5", "rosbag", "foxglove", "rerun", "archive"])
 def test_an_export_to_where_nothing_can_be_written_is_refused(inside, piece, recorded, tmp_path, form):
     (tmp_path / "file").write_text("in the way")
     session = recorded if form == "contacts" else piece

@@ -28,6 +28,8 @@ def files(folder: Path) -> list[str]:
         (("single", "--number", 3, "--number", 4, "--side-mm", 40), ["single-3", "single-4"], "single"),
         (("grid", "--columns", 3, "--rows", 2, "--side-mm", 30, "--gap-mm", 8), ["grid"], "grid"),
         (("charuco", "--paper", "A3"), ["charuco"], "charuco"),
+        (("chessboard", "--square-mm", 19), ["chessboard"], "chessboard"),
+        (("aprilgrid", "--columns", 4, "--rows", 4), ["aprilgrid"], "aprilgrid"),
     ],
 )
 def test_a_sheet_is_written_as_pdf_and_svg_with_what_describes_it(
@@ -92,6 +94,7 @@ def test_a_person_is_asked_for_the_bar_and_may_answer_later(
         (("charuco", "--square-mm", 60, "--marker-mm", 40), 2, "do not fit on A4"),
         (("charuco", "--square-mm", 20, "--marker-mm", 20), 2, "marker"),
         (("charuco", "--side-mm", 20), 2, "'--side-mm': has no effect for charuco"),
+        (("chessboard", "--dictionary", "DICT_4X4_50"), 2, "'--dictionary': has no effect for chessboard"),
         (("single", "--dictionary", "DICT_9X9_50"), 2, "'DICT_9X9_50' is not an OpenCV dictionary. Change"),
         (("single", "--number", 50), 2, "50"),
         (("single", "--side-mm", -4), 2, "side_m"),

@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 from drivers.core.errors import ConfigurationError, SessionError
@@ -63,7 +64,7 @@ def test_devices_number_their_messages_in_the_recording(session):
 def test_tables_say_the_same_in_every_form(first_grasp, tmp_path):
     rows = exporting.export_csv(first_grasp, tmp_path / "csv")
     assert rows == exporting.export_hdf5(first_grasp, tmp_path / "s.h5")
-    assert rows == exporting.export_rosbag(first_grasp, tmp_path / "bag")
+    assert rows < exporting.export_rosbag(first_grasp, tmp_path / "bag")  # and its frames and markers
     with (tmp_path / "csv" / "wrench_FF.csv").open(newline="") as file:
         lines = list(csv.DictReader(file))
     with h5py.File(tmp_path / "s.h5") as file:
@@ -74,7 +75,7 @@ def test_tables_say_the_same_in_every_form(first_grasp, tmp_path):
         kinds = {connection.topic: connection.msgtype for connection in bag.connections}
         wrenches = [c for c in bag.connections if c.topic == "/ft/FF/wrench"]
         forces = [bag.deserialize(raw, c.msgtype).wrench.force.x for c, _, raw in bag.messages(wrenches)]
-    assert kinds["/joints"] == "sensor_msgs/msg/JointState"
+    assert kinds["/joint_states"] == "sensor_msgs/msg/JointState"
     assert kinds["/camera/image/compressed"] == "sensor_msgs/msg/CompressedImage"
     assert np.array_equal(forces, [float(line["fx_N"]) for line in lines])
     for export, place in (
@@ -84,6 +85,30 @@ def test_tables_say_the_same_in_every_form(first_grasp, tmp_path):
     ):
         with pytest.raises(SessionError, match=r"exists already|cannot be written"):
             export(first_grasp, tmp_path / place)
+
+
+def test_a_whole_session_is_told_to_viewers_in_standard_types_with_every_frame_connected(session, tmp_path):
+    count = exporting.export_foxglove(session, tmp_path / "s.mcap")
+    parents, used, told = {}, set(), {}
+    with (tmp_path / "s.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        assert summary.statistics.message_count == count
+        topics = [one.topic for one in summary.channels.values() if one.message_encoding == "protobuf"]
+        for _, channel, _, message in reader.iter_decoded_messages(topics=topics):
+            told[channel.topic] = message
+            for one in getattr(message, "transforms", ()):
+                parents[one.child_frame_id] = one.parent_frame_id
+            used |= {one.frame_id for one in [message, *getattr(message, "entities", ())] if hasattr(one, "frame_id")}
+    assert {"camera", "object", "rh_ffdistal", "world"} <= used
+    for frame in used:
+        while frame != "world":
+            frame = parents[frame]
+    estimates = [json.loads(m.data) for m in session.traffic().messages() if m.topic == "/slam/pose"]
+    assert told["/object/pose"].pose.position.x == estimates[-1]["pose"]["position"]["x"]
+    assert told["/object/surface"].entities[0].triangles[0].indices
+    size = sum(path.stat().st_size for path in session.folder.glob("traffic*.mcap"))
+    assert (tmp_path / "s.mcap").stat().st_size < 0.3 * size
 
 
 def test_a_session_out_of_an_archive_is_the_same_in_every_byte_that_a_replay_reads(session, tmp_path):

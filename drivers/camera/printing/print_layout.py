@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.boards import AnyBoard, CharucoBoard, CHECK_BAR_mm, GridBoard, SingleMarker
+from drivers.camera.boards import AnyBoard, CharucoBoard, GridBoard, SingleMarker
+from drivers.camera.targets.april_grid import AprilGrid
+from drivers.camera.targets.chessboard import Chessboard
+from drivers.camera.targets.printed import CHECK_BAR_mm, MarkerPrint
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 
@@ -160,30 +162,41 @@ def _frame(left: float, top: float, width: float, height: float) -> list[Line]:
 
 def _piece(print_: AnyBoard) -> _Piece:
     width, height = (1e3 * size for size in print_.size_m)
+    if isinstance(print_, Chessboard):
+        square = 1e3 * print_.square_m
+        areas, border = [Area(tuple(square * outline for outline in outlines(print_.is_black > 0)))], square / 2
+        title = f"chessboard {print_.columns} x {print_.rows}  squares {square:g} mm"
+        return _Piece(width + 2 * border, height + 2 * border, border, tuple(areas), title)
     if isinstance(print_, SingleMarker):
-        areas, module = [_marker(print_, print_.number, (0.0, 0.0), width)], width / _modules(print_)
+        areas, module = [_marker(print_, print_.number, (0.0, 0.0), width)], width / print_.modules
         title = f"{print_.dictionary}  id {print_.number}  {width:g} mm"
-    elif isinstance(print_, GridBoard):
-        areas, module = _grid(print_), 1e3 * print_.side_m / _modules(print_)
+    elif isinstance(print_, GridBoard | AprilGrid):
+        areas, module = _grid(print_), 1e3 * print_.side_m / print_.modules
         numbers = f"ids {print_.numbers[0]}-{print_.numbers[-1]}"
         sides = f"markers {1e3 * print_.side_m:g} mm, gaps {1e3 * print_.gap_m:g} mm"
-        title = f"{print_.dictionary}  grid {print_.columns} x {print_.rows}  {numbers}  {sides}"
+        title = f"{print_.dictionary}  {print_.kind} {print_.columns} x {print_.rows}  {numbers}  {sides}"
     else:
-        areas, module = _charuco(print_), 1e3 * print_.marker_m / _modules(print_)
+        areas, module = _charuco(print_), 1e3 * print_.marker_m / print_.modules
         sides = f"squares {1e3 * print_.square_m:g} mm, markers {1e3 * print_.marker_m:g} mm"
         title = f"{print_.dictionary}  ChArUco {print_.columns} x {print_.rows}  {sides}"
     border = WHITE_MODULES * module
     return _Piece(width + 2 * border, height + 2 * border, border, tuple(areas), title)
 
 
-def _grid(board: GridBoard) -> list[Area]:
+def _grid(board: GridBoard | AprilGrid) -> list[Area]:
     width, height = board.size_m
-    areas = []
+    areas = _squares(board) if isinstance(board, AprilGrid) else []
     for number in board.numbers:
         x, y = board.marker_corners_m(number)[0, :2] / board.scale
         corner = (1e3 * (float(x) + width / 2), 1e3 * (height / 2 - float(y)))
         areas.append(_marker(board, number, corner, 1e3 * board.side_m))
     return areas
+
+
+def _squares(board: AprilGrid) -> list[Area]:
+    """The black squares between the tags' corners."""
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    return [Area((1e3 * (corner + board.gap_m * square),)) for corner in board.square_corners_m]
 
 
 def _charuco(board: CharucoBoard) -> list[Area]:
@@ -198,15 +211,10 @@ def _charuco(board: CharucoBoard) -> list[Area]:
     return [Area(tuple(1e3 * board.square_m * outline for outline in outlines(squares))), *markers]
 
 
-def _marker(print_: AnyBoard, number: int, corner: tuple[float, float], side: float) -> Area:
-    modules = _modules(print_)
-    black = cv2.aruco.generateImageMarker(print_.opencv_dictionary, number, modules) < 128
+def _marker(print_: MarkerPrint, number: int, corner: tuple[float, float], side: float) -> Area:
+    modules = print_.modules
+    black = print_.marker_image(number, modules) < 128
     return Area(tuple(outline * side / modules + corner for outline in outlines(black)))
-
-
-def _modules(print_: AnyBoard) -> int:
-    """Number of modules across a marker, including its black frame."""
-    return int(print_.opencv_dictionary.markerSize) + 2
 
 
 def outlines(black: NDArray[np.bool_]) -> list[Array]:

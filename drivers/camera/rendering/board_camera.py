@@ -13,14 +13,16 @@ import cv2
 import numpy as np
 from gtsam import Pose3, Rot3
 
-from drivers.camera.boards import AnyBoard, CharucoBoard, GridBoard
+from drivers.camera.boards import AnyBoard, CharucoBoard, GridBoard, SingleMarker
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.frames import Image
-from drivers.camera.markers import MarkerSettings, opencv_dictionary
+from drivers.camera.markers import MarkerSettings
 from drivers.camera.pictures import Picture
 from drivers.camera.rendering.settings import CameraSettings
 from drivers.camera.rendering.table_camera import PrintedMarker, TableCamera
 from drivers.camera.source_settings import CameraSourceSettings
+from drivers.camera.targets.april_grid import AprilGrid
+from drivers.camera.targets.chessboard import Chessboard
 from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
@@ -75,27 +77,31 @@ def board_texture(board: AnyBoard) -> Array:
     """The print with its white margin as grey levels, with many texels per module."""
     width_m, height_m = board.size_m
     size = (round(width_m * _TEXELS_PER_m), round(height_m * _TEXELS_PER_m))
-    if isinstance(board, CharucoBoard):
+    if isinstance(board, Chessboard):
+        inner = cv2.resize(np.where(board.is_black, 0, 255).astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
+    elif isinstance(board, CharucoBoard):
         inner = board.opencv_board.generateImage(size, marginSize=0)
-    elif isinstance(board, GridBoard):
-        inner = _grid_texture(board, size)
+    elif isinstance(board, SingleMarker):
+        inner = board.marker_image(board.number, size[0])
     else:
-        inner = cv2.aruco.generateImageMarker(board.opencv_dictionary, board.number, size[0])
+        inner = _grid_texture(board, size)
     across, down = round(_MARGIN * size[0]), round(_MARGIN * size[1])
     whole = cv2.copyMakeBorder(inner, down, down, across, across, cv2.BORDER_CONSTANT, value=255)
     return np.where(whole > 127, _WHITE, _BLACK).astype(np.float32)
 
 
-def _grid_texture(board: GridBoard, size: tuple[int, int]) -> Image:
+def _grid_texture(board: GridBoard | AprilGrid, size: tuple[int, int]) -> Image:
     inner = np.full(size[::-1], 255, np.uint8)
     side = round(board.side_m * _TEXELS_PER_m)
+    for corner in board.square_corners_m if isinstance(board, AprilGrid) else ():
+        column, row = np.rint(_TEXELS_PER_m * corner).astype(int)
+        end_column, end_row = np.rint(_TEXELS_PER_m * (corner + board.gap_m)).astype(int)
+        inner[row:end_row, column:end_column] = 0
     for number in board.numbers:
         left, top = board.marker_corners_m(number)[0, :2] / board.scale
         column = round((left + board.size_m[0] / 2) * _TEXELS_PER_m)
         row = round((board.size_m[1] / 2 - top) * _TEXELS_PER_m)
-        inner[row : row + side, column : column + side] = cv2.aruco.generateImageMarker(
-            opencv_dictionary(board.dictionary), number, side
-        )
+        inner[row : row + side, column : column + side] = board.marker_image(number, side)
     return inner
 
 
@@ -146,7 +152,8 @@ def simulated_lens(size_px: tuple[int, int]) -> CameraCalibration:
 
 
 class SimulatedSource:
-    """``simulated``: the two markers on the table, without end; ``simulated:board``: a ChArUco board held up.
+    """``simulated``: the two markers on the table, without end; ``simulated:board``: a ChArUco board held up;
+    ``simulated:chessboard`` and ``simulated:aprilgrid``: these.
 
     Pictures are drawn beforehand, because drawing takes longer than detection, and returned at the camera's rate. The
     board source ends after :data:`BOARD_VIEWS` pictures, which are returned as fast as they can be drawn.
@@ -164,10 +171,10 @@ class SimulatedSource:
         scene = self._settings.place().name or "table"
         if scene == "table":
             self._pictures = table_pictures(self._settings, _PICTURES, self._rng)
-        elif scene == "board":
+        elif scene in ("board", "chessboard", "aprilgrid"):
             self._poses = board_poses(self._board, self._lens, BOARD_VIEWS, self._rng)
         else:
-            hint = "Choose simulated:table or simulated:board"
+            hint = "Choose simulated:table, simulated:board, simulated:chessboard or simulated:aprilgrid"
             raise ConfigurationError(f"no scene called {scene!r}", where="simulated camera", hint=hint)
         self._start_ns = self._clock.now_ns()
 
@@ -196,8 +203,9 @@ class SimulatedSource:
         return simulated_lens(self._settings.size_px)
 
     @property
-    def _board(self) -> CharucoBoard:
-        return CharucoBoard(dictionary=self._settings.dictionary)
+    def _board(self) -> AnyBoard:
+        boards: dict[str, AnyBoard] = {"chessboard": Chessboard(), "aprilgrid": AprilGrid()}
+        return boards.get(self._settings.place().name, CharucoBoard(dictionary=self._settings.dictionary))
 
 
 def table_pictures(settings: CameraSourceSettings, count: int, rng: np.random.Generator) -> list[Image]:

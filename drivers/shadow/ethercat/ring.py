@@ -11,6 +11,7 @@ from drivers.ethercat.frames import Command, Telegram
 from drivers.ethercat.master import EtherCatMaster, Slave
 from drivers.ethercat.registers import FMMU_BYTES, SYNC_MANAGER_BYTES, AlState, Register
 from drivers.shadow.ethercat.hand_identity import SERIAL_WORD, BoardIdentity, HandIdentity, checked_image
+from drivers.shadow.ethercat.process_data_size import OTHER_SIZE, check_size, other_size
 from drivers.shadow.protocol.palm_images import BRIDGE_PRODUCT, IMAGE_BASE, PalmImage, PalmName, Side
 
 _VENDOR, _PRODUCT, _REVISION = 0x08, 0x0A, 0x0C
@@ -57,7 +58,7 @@ class HandRing:
         self._all_to(AlState.PREOP)
         self._open_loop_port()
         watchdog_s = self._map(image)
-        self._all_to(AlState.SAFEOP)
+        self._enter_safeop(image)
         self._all_to(AlState.OP)
         self._exchange_zeros(image)
         return HandIdentity(bridge, palm, image, watchdog_s)
@@ -84,7 +85,9 @@ class HandRing:
         """
         self._check_ring()
         bridge, palm = self._identify(0), self._identify(1)
-        return bridge, palm, checked_image(bridge, palm, self._palm, self._serial, self._master.where, self._side)
+        image = checked_image(bridge, palm, self._palm, self._serial, self._master.where, self._side)
+        check_size(self._master, Slave(1), image)
+        return bridge, palm, image
 
     def _check_ring(self) -> None:
         count = self._master.count_slaves()
@@ -112,6 +115,14 @@ class HandRing:
     def _all_to(self, state: AlState) -> None:
         for slave in (self.BRIDGE, self.PALM):
             self._master.change_state(slave, state)
+
+    def _enter_safeop(self, image: PalmImage) -> None:
+        try:
+            self._all_to(AlState.SAFEOP)
+        except DeviceError as error:
+            if self._master.al_status(self.PALM).code not in OTHER_SIZE:
+                raise
+            raise other_size(image, self._master.where, "of another size or place") from error
 
     def _open_loop_port(self) -> None:
         """The bridge's port that leads on to the palm follows its transport by itself, as Shadow's driver sets it."""

@@ -23,7 +23,8 @@ def camera(
         typer.Argument(help="Camera (0, /dev/video0), folder of pictures, video, gstreamer:PIPELINE, simulated:board."),
     ],
     board: Annotated[
-        Path | None, typer.Option(help="Description of the board, written by 'tactile-lab markers'.")
+        Path | None,
+        typer.Option(help="Description of the board, from 'tactile-lab markers', or Kalibr's target file."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/camera.yaml")

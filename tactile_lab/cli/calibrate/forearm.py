@@ -99,11 +99,12 @@ def forearm(
             pose = transform_of([value / 1e3 for value in translation_mm], rpy_deg)
             found = manual_record(pose, *sigmas, here, notes=notes, valid_days=valid_days)
         else:
-            require_right_hand(load_rig(rig))
             wanted = _settings(settings)
             if source is not None:
                 data = _load_recorded(source, here)
-            else:
+            if source is None or not data.pairs:  # pairs of another program know nothing of the hand's joints
+                require_right_hand(load_rig(rig))
+            if source is None:
                 names = tuple(name.strip() for name in fingers.split(","))
                 data = _measure(asker, wanted, rig, method, seed, geometry, board, names, touches, pictures)
                 if record is not None:

@@ -9,8 +9,10 @@ from typing import Literal
 
 from sessions.guided.operator import Operator, Together
 from sessions.guided.simulated_operator import SimulatedOperator
+from sessions.recording.recorder import TrafficSink
 from tactile_lab.cli.console import say, warn
 from tactile_lab.cli.running.guided_terminal import terminal_for
+from tactile_lab.cli.running.live_address import LiveAddress, serve_live
 from tactile_lab.cli.running.page_address import PageAddress
 from tactile_lab.view.feed import ViewFeed
 from tactile_lab.workflow.attending import Attendance
@@ -36,35 +38,41 @@ class GuidedWay:
 
 
 @contextmanager
-def attendance(way: GuidedWay | None, page: PageAddress | None, title: str) -> Iterator[Attendance]:
+def attendance(
+    way: GuidedWay | None, page: PageAddress | None, live: LiveAddress | None, title: str
+) -> Iterator[Attendance]:
     """The people attending while the session runs; the terminal is restored afterwards.
 
     Args:
         way: None for an autonomous session.
         page: address of the live page; None for no page.
+        live: address of the server for viewers; None for no server.
         title: title of the page.
 
     Raises:
-        ConfigurationError: the pedal's key is unknown.
-        ConfigurationError, DeviceError: the page cannot be opened there.
+        ConfigurationError: the pedal's key is unknown, or a package is missing.
+        ConfigurationError, DeviceError: the page or the server cannot be opened there.
     """
     with ExitStack() as stack:
         feed = None if page is None else stack.enter_context(_page(page, title))
         operators: list[Operator] = [] if feed is None else [feed]
+        onlookers: list[TrafficSink] = [] if feed is None else [feed]
+        if live is not None:
+            onlookers.append(stack.enter_context(serve_live(live, title)))
         if way is not None and way.no_input:
             operators.append(SimulatedOperator())
         elif way is not None:
             terminal = terminal_for(way.pedal)
             stack.enter_context(terminal)
             operators.append(terminal)
-        yield _attendance(way, Together(*operators) if operators else None, feed)
+        yield _attendance(way, Together(*operators) if operators else None, tuple(onlookers))
 
 
-def _attendance(way: GuidedWay | None, operator: Operator | None, feed: ViewFeed | None) -> Attendance:
+def _attendance(way: GuidedWay | None, operator: Operator | None, onlookers: tuple[TrafficSink, ...]) -> Attendance:
     if way is None:
-        return Attendance(operator, onlooker=feed)
+        return Attendance(operator, onlookers=onlookers)
     pace = 0.0 if way.no_input else way.pace
-    return Attendance(operator, True, way.led_by, way.automatic, pace, feed)
+    return Attendance(operator, True, way.led_by, way.automatic, pace, onlookers)
 
 
 @contextmanager

@@ -20,6 +20,7 @@ from tactile_lab.cli.options import (
     NoInput,
     RigName,
 )
+from tactile_lab.cli.running.live_address import LIVE_PORT, Live, LiveAddress, LiveOrigin, LivePort
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 _GUIDED, _EXPLORATION = "Guided sessions", "Choice of the grasps"
@@ -96,6 +97,9 @@ def run(
     listen: Listen = "127.0.0.1",
     token: Token = "",
     certificate: Certificate = None,
+    live: Live = False,
+    live_port: LivePort = LIVE_PORT,
+    live_origin: LiveOrigin = "",
     policy: Annotated[
         str | None,
         typer.Option(
@@ -156,6 +160,7 @@ def run(
             }
         )
     page = PageAddress.if_wanted(view, listen, view_port, token, certificate)
+    viewers = LiveAddress.if_wanted(live, rig, live_port, token, live_origin)
     way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
     request = SessionRequest(
         rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
@@ -165,7 +170,7 @@ def run(
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"
     with (
         LiveProgress(title, live=not (guided or confirm), reasons=policy is not None) as progress,
-        attendance(way if guided else None, page, title) as present,
+        attendance(way if guided else None, page, viewers, title) as present,
     ):
         finished = run_session(request, progress, replace(present, approve=TerminalApproval()) if confirm else present)
     conclude(finished, as_json)

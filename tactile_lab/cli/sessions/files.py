@@ -46,6 +46,11 @@ def export(
     rosbag: Annotated[
         Path | None, typer.Option(help="Write a ROS 2 bag to this new folder (needs the package rosbags).")
     ] = None,
+    foxglove: Annotated[
+        Path | None,
+        typer.Option(help="Write frames, contacts, surface and pictures to this new MCAP file, for Foxglove."),
+    ] = None,
+    rerun: Annotated[Path | None, typer.Option(help="Write the same to this new RRD file, for Rerun.")] = None,
     tum: Annotated[
         Path | None,
         typer.Option(help="Write the estimated and the true trajectory to this new folder, in TUM's text format."),
@@ -74,12 +79,28 @@ def export(
     from tactile_lab.workflow.exporters import export_as
 
     del no_input
+<<<<<<< HEAD
+    kinds = {
+        "csv": csv,
+        "hdf5": hdf5,
+        "rosbag": rosbag,
+        "foxglove": foxglove,
+        "rerun": rerun,
+        "tum": tum,
+        "archive": archive,
+    }
+    places = [place for place in (contacts, *kinds.values()) if place is not None]
+    if not places:
+        raise typer.BadParameter("give at least one of --contacts, --" + ", --".join(kinds))
+    refuse_existing(places)
+=======
     kinds = {"csv": csv, "hdf5": hdf5, "rosbag": rosbag, "tum": tum, "archive": archive}
     others = _places(other or ())
     places = [place for place in (contacts, *kinds.values()) if place is not None]
     if not places and not others:
         raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --tum, --archive, --as")
     refuse_existing([*places, *(place for _, place in others)])
+>>>>>>> main
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)

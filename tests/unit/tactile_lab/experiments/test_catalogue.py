@@ -28,7 +28,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "random-contacts": ({"shape": ["L"], "contacts": ["20"], "model": ["TP, normals", "chosen by evidence"]}, None),
     "figure-2.7": ({"shape": ["ellipse"], "contacts": ["5", "10"], "model": ["SE, normals"]}, None),
     "figure-2.12": ({"contacts": ["20"], "model": ["Matérn, normals"]}, None),
-    "figure-3.12": ({"shape": ["ellipse"], "noise": ["0", "100"], "method": ["known-pose"]}, 4),
+    "figure-3.12": ({"shape": ["ellipse"], "noise": ["0", "100"], "method": ["known-pose", "joint"]}, 4),
     "figure-3.14": ({"shape": ["ellipse"], "noise": ["25"], "particles": ["500", "1000"]}, 4),
     "figure-3.15": ({"shape": ["rectangle"], "constraints": ["0", "4"]}, 6),
     "figure-3.16": ({"shape": ["rectangle"], "noise": ["50"], "method": ["thesis-pf", "particle, no graph"]}, 3),

@@ -29,15 +29,15 @@ from sessions.guided.operator import Ask
 from sessions.recording.recorder import Level, Recorder
 from sessions.recording.session import create_session
 from sessions.recording.traffic import schemas
+from tactile_lab import process_feed
 from tactile_lab.cli.running.page_address import PageAddress
-from tactile_lab.view import page_transport
+from tactile_lab.process_feed import QUEUE_LENGTH
 from tactile_lab.view.controls import history_html, status_html
 from tactile_lab.view.drawing import patches
 from tactile_lab.view.feed import ViewFeed
 from tactile_lab.view.gate import Gate, Head, is_loopback, new_token, parse_head
 from tactile_lab.view.inner_door import InnerDoor
 from tactile_lab.view.page import Page
-from tactile_lab.view.page_transport import QUEUE_LENGTH
 from tactile_lab.view.scene import Scene, ellipse
 from tactile_lab.view.skeleton import bones
 from tests.support.repository import REPOSITORY
@@ -58,7 +58,7 @@ class SceneSink:
 @pytest.fixture(autouse=True)
 def patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """A page takes some seconds of processor time to start, of which a busy machine gives it little."""
-    monkeypatch.setattr(page_transport, "START_TIMEOUT_s", 600.0)
+    monkeypatch.setattr(process_feed, "START_TIMEOUT_s", 600.0)
 
 
 def contact(finger: str, x: float) -> Contact:

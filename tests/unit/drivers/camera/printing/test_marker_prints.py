@@ -15,6 +15,8 @@ from drivers.camera.frames import Image
 from drivers.camera.markers import MarkerSettings, detect
 from drivers.camera.printing.print_files import pdf_bytes, svg_text
 from drivers.camera.printing.print_layout import check_bar, outlines, sheet_of
+from drivers.camera.targets.april_grid import AprilGrid
+from drivers.camera.targets.chessboard import Chessboard
 from drivers.core.calibration_file import load_parameters
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
@@ -69,7 +71,9 @@ def pdf_areas(content: bytes, height_mm: float) -> list[list[Array]]:
     return areas
 
 
-@pytest.mark.parametrize("board", [CharucoBoard(), GridBoard()], ids=lambda board: board.kind)
+@pytest.mark.parametrize(
+    "board", [CharucoBoard(), GridBoard(), Chessboard(), AprilGrid()], ids=lambda board: board.kind
+)
 def test_a_board_is_read_whole_and_at_true_size_from_svg_and_pdf(board: AnyBoard) -> None:
     sheet = sheet_of([board])
     for areas in (svg_areas(svg_text(sheet)), pdf_areas(pdf_bytes(sheet), sheet.size_mm[1])):

@@ -1,0 +1,76 @@
+"""Address of the server for other viewers, from command line options."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactile_lab.cli.running.page_address import HERE, PageAddress
+
+if TYPE_CHECKING:
+    from tactile_lab.viewers.live.feed import LiveFeed
+
+LIVE_PORT = 8765
+"""Which Foxglove and Lichtblick propose."""
+_PANEL = "Other viewers"
+
+Live = Annotated[
+    bool,
+    typer.Option(
+        "--live",
+        help="Also send this to Foxglove or Lichtblick on this computer, to watch only.",
+        rich_help_panel=_PANEL,
+    ),
+]
+LivePort = Annotated[
+    int,
+    typer.Option("--live-port", min=0, max=65535, help="Port for viewers; 0: any free port.", rich_help_panel=_PANEL),
+]
+LiveOrigin = Annotated[
+    str,
+    typer.Option(
+        "--live-origin",
+        metavar="URL",
+        help="A web application that may connect, besides Foxglove's and those of this computer.",
+        rich_help_panel=_PANEL,
+    ),
+]
+
+
+@dataclass(frozen=True)
+class LiveAddress:
+    """Rig, port, token and additional web application as typed."""
+
+    rig: str
+    port: int
+    token: str
+    origin: str
+
+    @classmethod
+    def if_wanted(cls, live: bool, rig: str, port: int, token: str, origin: str) -> LiveAddress | None:
+        """The address if viewers are wanted. Raises BadParameter for an option that needs them."""
+        for option, given in (("--live-port", port != LIVE_PORT), ("--live-origin", bool(origin))):
+            if given and not live:
+                raise typer.BadParameter("needs --live", param_hint=f"'{option}'")
+        return cls(rig, port, token, origin) if live else None
+
+
+@contextmanager
+def serve_live(live: LiveAddress, title: str) -> Iterator[LiveFeed]:
+    """The server, while the session runs. Raises ConfigurationError, DeviceError."""
+    from drivers.core.installed.extras import require_package
+    from tactile_lab.cli.console import say, warn
+    from tactile_lab.viewers.live.feed import LiveFeed
+
+    for package in ("foxglove", "websockets"):
+        require_package(package)
+    _, port, token, _ = PageAddress(HERE, live.port, live.token).check()
+    with LiveFeed(live.rig, HERE, port, token, title, live.origin) as feed:
+        say(f"live: {feed.url}   (Foxglove, Lichtblick: open connection, Foxglove WebSocket)")
+        yield feed
+    if feed.dropped:
+        warn(f"the viewers' server was too slow: {feed.dropped} messages were not sent, but all are recorded")
