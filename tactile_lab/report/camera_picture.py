@@ -28,6 +28,8 @@ from tactile_lab.rigs.description import OTHER_VERSION
 _CAMERA = "camera"
 _LARGEST_px, _QUALITY = 960, 82
 _NEAREST_m = 0.01
+_CARD_px = 460
+"""Width at which the picture is shown; lines and dots are scaled so that they look alike in pictures of any size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,19 +91,35 @@ def _last_view(session: Session, world_T_object: Poses) -> tuple[CameraView | No
 def draw_on_picture(
     view: CameraView, outlines: list[tuple[str, Array]], contacts_world_m: Array, description: str
 ) -> str:
-    """The picture with closed outlines (style and points in the world, shape (n, 3)) and contacts in it, as SVG."""
-    height, width = view.image.shape
-    chart = Chart(Frame(float(width), float(height), 0, 0, 0, 0), (0.0, float(width)), (float(height), 0.0))
-    chart.add(f'<image href="{_data_uri(view.image)}" width="{width}" height="{height}"/>')
-    scale = width / 460
-    for kind, points in outlines:
-        if (pixels := view.pixels(points)) is not None:
-            for part, width_px in (("casing", 2.6), (kind, 1.3)):  # legible on light and on dark
-                chart.path(pixels, f"seen {part}-seen", closed=True, style=f"stroke-width:{width_px * scale:.2f}")
+    """The picture around what is drawn, with closed outlines (style and points in the world, shape (n, 3)) and contacts
+    in it, as SVG.
+    """
+    drawn = [(kind, pixels) for kind, points in outlines if (pixels := view.pixels(points)) is not None]
     dots = view.pixels(contacts_world_m) if len(contacts_world_m) else None
+    (left, top), (right, bottom) = _around([pixels for _, pixels in drawn], view.image)
+    width, height = right - left, bottom - top
+    chart = Chart(Frame(float(width), float(height), 0, 0, 0, 0), (left, right), (bottom, top))
+    chart.add(f'<image href="{_data_uri(view.image[top:bottom, left:right])}" width="{width}" height="{height}"/>')
+    scale = width / _CARD_px
+    for kind, pixels in drawn:
+        for part, width_px in (("casing", 4.4), (kind, 2.2)):  # legible on light and on dark
+            chart.path(pixels, f"seen {part}-seen", closed=True, style=f"stroke-width:{width_px * scale:.2f}")
     for dot in dots if dots is not None else ():
-        chart.dot(dot, "contact-seen", radius=round(3.2 * scale, 2))
+        chart.dot(dot, "contact-seen", radius=round(4 * scale, 2), style=f"stroke-width:{1.4 * scale:.2f}")
     return chart.text("The camera's picture", description)
+
+
+def _around(drawn: list[Array], image: Image) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Left upper and right lower corner of the part of a picture to show: what is drawn and as much again around it."""
+    height, width = image.shape
+    inside = [pixels for pixels in drawn if ((pixels >= 0) & (pixels < [width, height])).all(axis=1).any()]
+    if not inside:
+        return (0, 0), (width, height)
+    points = np.concatenate(inside)
+    middle, half = (points.min(axis=0) + points.max(axis=0)) / 2, float(np.ptp(points, axis=0).max())
+    low = np.clip(middle - half, 0, [width - 1, height - 1]).astype(int)
+    high = np.clip(middle + half, low + 1, [width, height]).astype(int)
+    return (int(low[0]), int(low[1])), (int(high[0]), int(high[1]))
 
 
 def _data_uri(image: Image) -> str:

@@ -52,6 +52,13 @@ def test_the_session_folder_is_complete(recorded):
     assert not [name for name in files if name.endswith(".part")]
 
 
+def test_the_report_shows_the_cameras_picture_with_the_estimate(recorded):
+    page = (recorded / "results" / "report.html").read_text()
+    assert "picture of grasp 2" in page
+    assert 'href="data:image/jpeg;base64,' in page
+    assert page.count("estimate-seen") >= 2  # the outline, and its legend
+
+
 def test_the_report_fetches_nothing(recorded):
     page = (recorded / "results" / "report.html").read_text()
     addresses = set(re.findall(r"https?://[^\s\"'<>)]+", page)) - {"http://www.w3.org/2000/svg"}

@@ -79,7 +79,6 @@ def export(
     from tactile_lab.workflow.exporters import export_as
 
     del no_input
-<<<<<<< HEAD
     kinds = {
         "csv": csv,
         "hdf5": hdf5,
@@ -89,18 +88,11 @@ def export(
         "tum": tum,
         "archive": archive,
     }
-    places = [place for place in (contacts, *kinds.values()) if place is not None]
-    if not places:
-        raise typer.BadParameter("give at least one of --contacts, --" + ", --".join(kinds))
-    refuse_existing(places)
-=======
-    kinds = {"csv": csv, "hdf5": hdf5, "rosbag": rosbag, "tum": tum, "archive": archive}
     others = _places(other or ())
     places = [place for place in (contacts, *kinds.values()) if place is not None]
     if not places and not others:
-        raise typer.BadParameter("give at least one of --contacts, --csv, --hdf5, --rosbag, --tum, --archive, --as")
+        raise typer.BadParameter("give at least one of --contacts, --" + ", --".join([*kinds, "as"]))
     refuse_existing([*places, *(place for _, place in others)])
->>>>>>> main
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)

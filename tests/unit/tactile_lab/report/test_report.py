@@ -119,6 +119,15 @@ def test_page_fetches_nothing(text: str) -> None:
     assert "default-src 'none'" in policy[0]
 
 
+def test_what_the_estimate_says_of_itself_is_drawn(text: str) -> None:
+    words = Page(text).texts
+    assert "Are the uncertainties true?" in words
+    assert words.count("two stated standard deviations") == 2
+    assert {"Length", "Width"} <= set(words)
+    assert text.count('class="bound"') == 4  # both bands over the grasps, and their legends
+    assert "Poses inside" in words
+
+
 def test_texts_of_people_are_escaped(text: str) -> None:
     assert "alert('x')</script>" not in text
     page = Page(text)
