@@ -20,7 +20,8 @@ from tactile_lab.slam.doubt.symmetry import NEARLY_ALIKE_m, Symmetry, symmetry_o
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
-from tactile_lab.slam.tracking.trackers import Tracker, TrackingSettings
+from tactile_lab.slam.tracking.tracker import Tracker
+from tactile_lab.slam.tracking.trackers import TrackingSettings
 
 
 @dataclass(frozen=True)
