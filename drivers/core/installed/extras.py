@@ -22,7 +22,7 @@ EXTRAS = {
     "rerun": "rerun",
     "h5py": "export",
     "distributed": "cluster",
-    "pyarrow": "cluster",
+    "pyarrow": "export",
     "rosbags": "ros",
     "pxr": "usd",
 }

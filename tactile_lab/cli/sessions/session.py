@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, OtherMethod, Root, SessionName
+from tactile_lab.cli.sessions import catalogue as session_catalogue
 from tactile_lab.cli.sessions import files as session_files
 from tactile_lab.cli.sessions import slips as session_slips
 from tactile_lab.cli.sessions.choosing import choose_session, resolve_name
@@ -20,6 +21,7 @@ app = typer.Typer(help="Recorded sessions: list, show, replay, recover, export a
 app.command("extract")(session_files.extract)
 app.command("export")(session_files.export)
 app.command("import")(session_files.bring_in)
+app.command("catalogue")(session_catalogue.catalogue)
 app.command("slips")(session_slips.slips)
 
 
