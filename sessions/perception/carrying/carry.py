@@ -32,7 +32,7 @@ _NO_HOLD_s = 0.05
 
 @dataclass(frozen=True)
 class CarryNoise:
-    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decision 53).
+    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decision 55).
 
     Attributes:
         least_m, least_rad: of any carry.
