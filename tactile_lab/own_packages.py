@@ -8,7 +8,7 @@ inside the program. A folder without ``__init__.py``, such as recorded ``session
 from __future__ import annotations
 
 import sys
-from importlib.util import find_spec
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 
 PACKAGES = ("drivers", "calibration", "sessions")
@@ -24,9 +24,22 @@ def check_own_packages() -> None:
     home = Path(__file__).resolve().parents[1]
     for name in PACKAGES:
         ours, found = home / name / "__init__.py", _origin(name)
-        if ours.is_file() and found != ours:
-            hidden = f"{found or 'something else'} hides the package {name!r} of tactile-lab"
+        if not ours.is_file() or found == ours:
+            continue
+        if found is not None:
+            hidden = f"{found} hides the package {name!r} of tactile-lab"
             _refuse(f"{hidden}: rename it, or start Python in another folder")
+        _take(name, ours)
+
+
+def _take(name: str, file: Path) -> None:
+    """Import a package of ours from its file, whatever else Python would find."""
+    spec = spec_from_file_location(name, file, submodule_search_locations=[str(file.parent)])
+    assert spec is not None
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
 
 
 def _refuse(sentence: str) -> None:
@@ -36,7 +49,7 @@ def _refuse(sentence: str) -> None:
 
 
 def _origin(name: str) -> Path | None:
-    """The file that ``import name`` gives, without importing it; None where that cannot be told."""
+    """The file that ``import name`` gives, without importing it; None for a folder of no package, or nothing."""
     module = sys.modules.get(name)
     try:
         origin = find_spec(name).origin if module is None else module.__file__  # type: ignore[union-attr]
