@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from tests.support.forked_children import forked_children
+
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 # A shell without job control starts what runs in the background with Ctrl+C ignored, and children inherit that.
@@ -74,4 +76,11 @@ def real_time_alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """
     with (tmp_path_factory.getbasetemp().parent / "real-time.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+@pytest.fixture
+def quick_children() -> Iterator[None]:
+    """Child processes are copies of the test's: a new interpreter for each would take most of the time."""
+    with forked_children():
         yield

@@ -23,6 +23,7 @@ from typing import Any, Self
 from drivers.core.atomic_files import write_whole
 from drivers.core.clock import utc_text
 from drivers.core.errors import SessionError, TactileLabError
+from sessions.recording.deferred_interruption import interruption_deferred
 from sessions.recording.manifest import (
     MANIFEST,
     CalibrationCopy,
@@ -144,6 +145,8 @@ class RunningSession(Session):
     ) -> None:
         """Finish the traffic file and ``session.yaml``; idempotent, the first call counts.
 
+        A Ctrl+C meanwhile waits until both are finished: a session that had ended would be left open otherwise.
+
         Args:
             counts: counts besides those of the messages (grasps, cycles, overruns).
             data_loss: undecodable messages and so on; zeros are left out. Losses known to the recorder (gaps, late and
@@ -152,21 +155,33 @@ class RunningSession(Session):
         Raises:
             WriteError: the folder cannot be written.
             SessionError: it is not there any more.
+            KeyboardInterrupt: see above.
         """
         if self.manifest.status != "open":
             return
-        known = {kind: str(number) for kind, number in {**(counts or {}), **(data_loss or {})}.items()}
+        with interruption_deferred():
+            self._close(status, counts or {}, data_loss or {}, problem, now)
+
+    def _close(
+        self,
+        status: Status,
+        counts: Mapping[str, int],
+        data_loss: Mapping[str, int],
+        problem: str,
+        now: datetime | None,
+    ) -> None:
+        known = {kind: str(number) for kind, number in {**counts, **data_loss}.items()}
         try:
             self._traffic.close({"status": status, "problem": problem, **known})
         except SessionError as error:
             status, problem = "failed", problem or str(error)
         streams = self._traffic.streams
-        lost = {**(data_loss or {}), **streams.losses(), "traffic_cut_short": int(not self._traffic.complete)}
+        lost = {**data_loss, **streams.losses(), "traffic_cut_short": int(not self._traffic.complete)}
         self.manifest = self.manifest.model_copy(
             update={
                 "status": status,
                 "ended_utc": utc_text(now or datetime.now(UTC)),
-                "counts": {**dict(sorted(streams.messages.items())), **(counts or {})},
+                "counts": {**dict(sorted(streams.messages.items())), **counts},
                 "streams": streams.plain(),
                 "data_loss": {kind: number for kind, number in lost.items() if number},
                 "problem": problem,

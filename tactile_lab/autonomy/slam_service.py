@@ -19,6 +19,7 @@ from drivers.core.poses import planar
 from sessions.conductor.estimator import Estimate, PlannedGrasp, Reorientation
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
+from tactile_lab.autonomy.freed_memory import return_freed_memory
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.surface_message import surface_message
 from tactile_lab.autonomy.unknown_part import describe_unknown
@@ -98,6 +99,7 @@ class SlamService:
         self._estimates.append(Estimate(step, surface_message(shape), None if shape is None else shape.explored))
         self._count += 1
         self._estimates = self._estimates[known - self._count :]
+        return_freed_memory()
         return tuple(self._estimates)
 
     def undo(self, hand_motion_world: Pose3) -> None:

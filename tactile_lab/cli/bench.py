@@ -24,6 +24,7 @@ class Part(StrEnum):
     LOAD = "load"
     RECORDER = "recorder"
     START = "start"
+    MEMORY = "memory"
 
 
 Table: TypeAlias = tuple[str, Sequence[str], Sequence[Sequence[str]]]
@@ -37,6 +38,7 @@ _PAGES = {
     ),
     Part.LOAD: ("full-load", "Five force sensors at 7 kHz and the hand at 1 kHz at the same time."),
     Part.RECORDER: ("recorder", "Recording at full load: dropped messages and processor time."),
+    Part.MEMORY: ("memory", "Memory and time of the estimation in a session of 200 grasps."),
     Part.START: ("start", "Time until the program has started, as ratios to a Python that does nothing."),
 }
 """Name and description of each benchmark's stored result."""
@@ -50,7 +52,8 @@ def bench(
             "camera: marker detection in its own process; "
             "ethercat: both masters on the emulated hand, and how they recover; "
             "load: five force sensors at 7 kHz and the hand at 1 kHz; "
-            "recorder: recording the hand and five force sensors at 1 kHz, and 30 images per second."
+            "recorder: recording the hand and five force sensors at 1 kHz, and 30 images per second; "
+            "memory: of the estimation in a session of 200 grasps."
         ),
     ] = Part.PATHS,
     seconds: Annotated[
@@ -81,12 +84,14 @@ def bench(
             tables = _load(seconds, with_hand, as_json)
         case Part.RECORDER:
             tables = _recorder(seconds, as_json)
+        case Part.MEMORY:
+            tables = _memory(as_json)
         case Part.START:
             tables = _start(as_json)
         case Part.PATHS:
             tables = _paths(as_json)
     if store:
-        timed = "" if only in (Part.PATHS, Part.START) else f" --seconds {seconds:g}"
+        timed = "" if only in (Part.PATHS, Part.START, Part.MEMORY) else f" --seconds {seconds:g}"
         command = "tactile-lab bench" if only is Part.PATHS else f"tactile-lab bench --only {only}{timed}"
         _store(docs, only, command, tables)
 
@@ -195,6 +200,26 @@ def _recorder(seconds: float, as_json: bool) -> list[Table]:
     else:
         show_facts(title, facts.items())
     return [(title, ["what", "figure"], [list(fact) for fact in facts.items()])]
+
+
+def _memory(as_json: bool) -> list[Table]:
+    from dataclasses import asdict
+
+    from tactile_lab.benchmarks.session_memory import SEED, SHAPE, measure_memory
+    from tactile_lab.cli.console import emit_json, show_table
+
+    stretches = measure_memory()
+    beginning = stretches[0].memory_MB
+    title, head = f"{SHAPE}, seed {SEED}", ["until grasp", "resident MB", "growth MB", "step ms"]
+    cells = [
+        [str(one.last), f"{one.memory_MB:.0f}", f"{one.memory_MB - beginning:+.0f}", f"{one.step_ms:.0f}"]
+        for one in stretches
+    ]
+    if as_json:
+        emit_json([asdict(one) for one in stretches])
+    else:
+        show_table(title, head, cells, right=(0, 1, 2, 3))
+    return [(title, head, cells)]
 
 
 def _ms(value: float | None) -> str:

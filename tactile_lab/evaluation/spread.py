@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 CONFIDENCE = 0.95
 _RESAMPLED, _LEAST_RESAMPLED = 2000, 5
@@ -59,7 +59,7 @@ class Interval:
         if count < 2:
             return cls(mean, None, None)
         deviation = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1))
-        half = float(student.ppf((1 + CONFIDENCE) / 2, count - 1)) * deviation / math.sqrt(count)
+        half = float(stdtrit(count - 1, (1 + CONFIDENCE) / 2)) * deviation / math.sqrt(count)
         return cls(mean, mean - half, mean + half)
 
     @classmethod

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -11,8 +12,12 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.selection.models import SHAPE_MODELS, ShapeName, fit_shape
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.evidence.fixed_lag import condense
 from tactile_lab.slam.tracking.joint.pose_uncertainty import propagate_pose_uncertainty
 from tactile_lab.slam.tracking.trackers import TrackingSettings
+
+MOST_CONTACTS = 300
+"""Of the field between grasps: a thousand would take 72 MB in the plane, and seconds after every grasp."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +32,58 @@ class PresentShape:
 
     extracted: Contour | SurfaceMesh | None
     warning: str = ""
+
+
+class CurrentShape:
+    """Field and shape of the latest map, computed once. A copy begins without them, as they are large.
+
+    Between grasps, of more than :data:`MOST_CONTACTS` contacts a spread-out selection of the settled ones counts
+    (:mod:`tactile_lab.slam.tracking.evidence.fixed_lag`): neither memory nor time grow with the session.
+
+    Args:
+        settings: of the estimation.
+        model: of the shape.
+    """
+
+    def __init__(self, settings: TrackingSettings, model: ShapeName) -> None:
+        self._settings, self._model = settings, model
+        self._latest: tuple[ContactMap, bool, ContactMap] | None = None
+        self._shape: tuple[ContactMap, float, PresentShape] | None = None
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        return type(self)(self._settings, self._model)
+
+    def contacts(self, contact_map: ContactMap, *, has_ended: bool) -> ContactMap:
+        """The contacts that make up the shape.
+
+        Args:
+            contact_map: all contacts at their present poses.
+            has_ended: no grasp follows; all contacts count.
+        """
+        if self._latest is None or self._latest[0] is not contact_map or self._latest[1] is not has_ended:
+            chosen = contact_map if has_ended else _bounded(contact_map, self._settings.joint.window)
+            self._latest = contact_map, has_ended, chosen
+        return self._latest[2]
+
+    def extract(
+        self, contacts: ContactMap, origin_height_m: float, resolution_m: float
+    ) -> Contour | SurfaceMesh | None:
+        """See :func:`present_shape`."""
+        if self._shape is None or self._shape[0] is not contacts or self._shape[1] != resolution_m:
+            given = contacts.fit(), contacts, self._settings, self._model
+            self._shape = contacts, resolution_m, present_shape(*given, origin_height_m, resolution_m)
+        return self._shape[2].extracted
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Of the latest shape."""
+        return (self._shape[2].warning,) if self._shape is not None and self._shape[2].warning else ()
+
+
+def _bounded(contact_map: ContactMap, window: int) -> ContactMap:
+    """The map with at most :data:`MOST_CONTACTS` contacts, those of the last grasps among them."""
+    count, later = len(contact_map.contacts), contact_map.grasp_indices >= len(contact_map.placed) - window
+    return contact_map if count <= MOST_CONTACTS else condense(contact_map, window, MOST_CONTACTS - int(later.sum()))
 
 
 def present_shape(

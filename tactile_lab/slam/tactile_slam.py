@@ -33,7 +33,7 @@ from drivers.core.contacts import Array, Contact, Grasp
 from drivers.core.errors import TrackingError
 from drivers.core.observability import observability, planar_observability
 from drivers.core.one_thread import on_one_thread
-from tactile_lab.slam.current_shape import PresentShape, present_shape
+from tactile_lab.slam.current_shape import CurrentShape
 from tactile_lab.slam.doubt.assessment import assess
 from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.slam.graph.relocation import relocated_rows
@@ -121,8 +121,8 @@ class TactileSlam:
         """Contacts of grasps before the object frame, while the object stays where it is."""
 
         self._steps: list[SlamStep] = []
-        self._surface: tuple[ContactMap, Gpis] | None = None
-        self._shape: tuple[ContactMap, float, PresentShape] | None = None
+        self._shape = CurrentShape(self._settings, self._settings.shape_model)
+        self._has_ended = False
 
     @property
     def settings(self) -> SlamSettings:
@@ -166,6 +166,7 @@ class TactileSlam:
     @on_one_thread
     def finish(self) -> SlamResult:
         """Correct all poses a last time, and build the final shape with the best kernel parameters."""
+        self._has_ended = True
         if self._tracker is not None:
             self._tracker.finish()
             self._tracker.adopt(self._back_end.close_all_loops(self._tracker.map))
@@ -192,7 +193,7 @@ class TactileSlam:
             contour=told.shape if isinstance(told.shape, Contour) else None,
             mesh=told.shape if isinstance(told.shape, SurfaceMesh) else None,
             status=told.status,
-            warnings=self._warnings,
+            warnings=self._shape.warnings,
             known_share=told.known_share,
             doubts=told.doubts,
             alternatives=told.alternatives,
@@ -222,13 +223,17 @@ class TactileSlam:
     @property
     @on_one_thread
     def surface(self) -> Gpis | None:
-        """The present field in the object frame; None before there are contacts."""
+        """The present field in the object frame; None before there are contacts.
+
+        Before the end of a long session settled contacts are represented by some of them, see :class:`CurrentShape`.
+        """
+        contacts = self._shape_contacts()
+        return None if contacts is None else contacts.fit()
+
+    def _shape_contacts(self) -> ContactMap | None:
         if self._tracker is None:
             return None
-        contact_map = self._tracker.refined
-        if self._surface is None or self._surface[0] is not contact_map:
-            self._surface = (contact_map, contact_map.fit())
-        return self._surface[1]
+        return self._shape.contacts(self._tracker.refined, has_ended=self._has_ended)
 
     @on_one_thread
     def shape(self, resolution_m: float) -> Contour | SurfaceMesh | None:
@@ -236,23 +241,16 @@ class TactileSlam:
 
         See :func:`tactile_lab.slam.current_shape.present_shape`.
         """
-        if self._tracker is None or self.surface is None:
-            return None
-        contact_map, height_m = self._tracker.refined, self._origin_height_m
-        if self._shape is None or self._shape[0] is not contact_map or self._shape[1] != resolution_m:
-            model = self._settings.shape_model
-            made = present_shape(self.surface, contact_map, self._settings, model, height_m, resolution_m)
-            self._shape = (contact_map, resolution_m, made)
-        return self._shape[2].extracted
-
-    @property
-    def _warnings(self) -> tuple[str, ...]:
-        return (self._shape[2].warning,) if self._shape is not None and self._shape[2].warning else ()
+        contacts = self._shape_contacts()
+        return None if contacts is None else self._shape.extract(contacts, self._origin_height_m, resolution_m)
 
     @property
     def surface_grasps(self) -> NDArray[np.intp]:
-        """Number of the grasp of each contact of :attr:`surface`, from the first in the map, shape (n,)."""
-        return np.empty(0, dtype=np.intp) if self._tracker is None else self._tracker.refined.grasp_indices
+        """Number of the grasp of each contact of :attr:`surface`, shape (n,): 0 for the first in the map and for all
+        that are settled, and growing from there.
+        """
+        contacts = self._shape_contacts()
+        return np.empty(0, dtype=np.intp) if contacts is None else contacts.grasp_indices
 
     @property
     def mechanisms_that_acted(self) -> frozenset[Mechanism]:

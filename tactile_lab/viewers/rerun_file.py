@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import socket
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import rerun as rr
 
@@ -12,6 +14,7 @@ from tactile_lab.viewers.recorded_items import RecordedItems
 from tactile_lab.viewers.rerun_log import RerunLog, blueprint
 
 APPLICATION = "tactile-lab"
+_PORT, _PATIENCE_s = 9876, 5.0
 _BATCHES = rr.ChunkBatcherConfig(flush_tick=30.0, flush_num_bytes=2_000_000, flush_num_rows=1_000_000)
 """Rerun's own batches are for live data: a file of them is ten times as large."""
 
@@ -44,6 +47,8 @@ def show_in_rerun(items: RecordedItems, name: str, address: str = "") -> int:
     Raises:
         ConfigurationError: the viewer cannot be started, or there is none at the address.
     """
+    if address:
+        _check_answers(address)
     stream = rr.RecordingStream(APPLICATION, recording_id=name, batcher_config=_BATCHES)
     try:
         if address:
@@ -52,8 +57,21 @@ def show_in_rerun(items: RecordedItems, name: str, address: str = "") -> int:
             stream.spawn(default_blueprint=blueprint())
         return _send(stream, items)
     except (OSError, RuntimeError, ValueError) as error:
-        hint = "Start it with the command rerun, or write a file: tactile-lab session export NAME --rerun FILE.rrd"
-        raise ConfigurationError(f"its viewer cannot be reached ({error})", where="rerun", hint=hint) from error
+        raise _unreachable(str(error)) from error
+
+
+def _check_answers(address: str) -> None:
+    """Raises ConfigurationError where nothing listens: Rerun itself would say so only after everything was computed."""
+    try:
+        parts = urlsplit(address.removeprefix("rerun+"))
+        socket.create_connection((parts.hostname or "", parts.port or _PORT), timeout=_PATIENCE_s).close()
+    except (OSError, ValueError) as error:
+        raise _unreachable(f"{address}: {error}") from error
+
+
+def _unreachable(why: str) -> ConfigurationError:
+    hint = "Start it with the command rerun, or write a file: tactile-lab session export NAME --rerun FILE.rrd"
+    return ConfigurationError(f"its viewer cannot be reached ({why})", where="rerun", hint=hint)
 
 
 def _send(stream: rr.RecordingStream, items: RecordedItems) -> int:

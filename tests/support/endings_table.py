@@ -3,7 +3,8 @@
     python -m tests.support.endings_table --store
 
 A session of the simulated rig is struck as soon as its recording has messages. The machine's own clock is left alone:
-what a jump of it does to a recording is in the experiment ``crash-recovery``.
+the wall clock jumps for the session only. What a jump of the session's own clock does is in the experiment
+``crash-recovery``.
 """
 
 from __future__ import annotations
@@ -21,10 +22,13 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
+from datetime import datetime, timedelta, tzinfo
 from functools import partial
 from pathlib import Path
+from typing import Self
 
 from drivers.core.errors import TactileLabError
+from sessions.recording import session as session_files
 from sessions.recording.session import Session
 from sessions.recording.traffic import disk
 from tactile_lab.benchmarks.start_times import has_messages
@@ -196,6 +200,27 @@ def _stand_still(file: disk.CutBackFile, data: bytes) -> None:
         time.sleep(_STALL_s)
 
 
+def _clock_jumps(by: timedelta) -> Callable[[], None]:
+    """The wall clock is set while the session runs: it says another time whenever it is asked after the first."""
+
+    def prepare() -> None:
+        asked = 0
+
+        class Jumping(datetime):
+            @classmethod
+            def now(cls, tz: tzinfo | None = None) -> Self:
+                nonlocal asked
+                asked += 1
+                return super().now(tz) + (by if asked > 1 else timedelta())
+
+        seconds, usual = by.total_seconds(), (time.time, time.time_ns)
+        session_files.datetime = Jumping  # type: ignore[attr-defined]
+        time.time = lambda: usual[0]() + (seconds if asked else 0.0)
+        time.time_ns = lambda: usual[1]() + (round(1e9 * seconds) if asked else 0)
+
+    return prepare
+
+
 def _beside_another(running: Running) -> None:
     """A second session in the same folder, to its end."""
     null = os.open(os.devnull, os.O_RDWR)
@@ -222,6 +247,8 @@ ENDINGS: dict[str, Ending] = {
     "its folder renamed": Ending(_rename),
     "its folder made read-only": Ending(_make_read_only, prepare=_as_nobody),
     "another session in the same folder": Ending(_beside_another),
+    "the wall clock set back by an hour": Ending(prepare=_clock_jumps(timedelta(hours=-1))),
+    "the wall clock set forward by an hour": Ending(prepare=_clock_jumps(timedelta(hours=1))),
     "a disk of 100 kB/s": Ending(prepare=_bad_disk(_take_time)),
     "a disk that stands still for 15 s": Ending(prepare=_bad_disk(_stand_still)),
     "a disk that goes away": Ending(prepare=_bad_disk(_go_away)),

@@ -1,8 +1,10 @@
 """Changes one byte anywhere in a recording: what is lost, and is the loss reported correctly?
 
     python -m tests.support.flipped_bytes --places 2000
+    python -m tests.support.flipped_bytes --recording runs/SESSION/traffic.mcap --places 2000
 
-Prints a line of figures. The recording has several chunks and topics and an attachment, and is whole or truncated.
+Prints lines of figures. The recording has several chunks and topics and an attachment, and is whole or truncated; or it
+is that of a session, and the bytes are those of its first chunk and of the one in its middle.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import struct
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 
@@ -36,13 +38,14 @@ class Recording:
 
     Attributes:
         content: its bytes.
-        topics: of each message, by its number.
+        topics, data: of each message, by its number.
         chunks: the chunk of each message.
         spans: position of each chunk, including its indices.
     """
 
     content: bytes
     topics: list[str]
+    data: list[bytes]
     chunks: list[int]
     spans: list[tuple[int, int]]
 
@@ -62,8 +65,16 @@ def make_recording(folder: Path, count: int = 400, *, whole: bool = True) -> Rec
     for number, topic in enumerate(topics):
         writer.write(topic, number.to_bytes(4, "little") + random.bytes(20), number * _STEP_ns)
     writer.close()
-    content = path.read_bytes()
+    made = read_recording(path)
     path.unlink()
+    assert made.topics == topics
+    return made if whole else replace(made, content=made.content[: made.spans[-1][1]])
+
+
+def read_recording(path: Path) -> Recording:
+    """A sound recording in one file, whose messages are numbered from 0."""
+    content, messages = path.read_bytes(), list(TrafficReader(path).messages())
+    assert [message.sequence for message in messages] == list(range(len(messages)))
     chunks: list[int] = []
     spans: list[tuple[int, int]] = []
     for opcode, start, end in _records(content):
@@ -73,8 +84,9 @@ def make_recording(folder: Path, count: int = 400, *, whole: bool = True) -> Rec
             spans.append((start, end))
         elif opcode == Opcode.MESSAGE_INDEX:
             spans[-1] = (spans[-1][0], end)
-    assert len(chunks) == count
-    return Recording(content if whole else content[: spans[-1][1]], topics, chunks, spans)
+    assert len(chunks) == len(messages)
+    topics, data = [message.topic for message in messages], [message.data for message in messages]
+    return Recording(content, topics, data, chunks, spans)
 
 
 def _records(content: bytes) -> Iterator[tuple[int, int, int]]:
@@ -100,11 +112,14 @@ def read_flipped(made: Recording, place: int, by: int, path: Path) -> tuple[set[
     changed[place] ^= by
     path.write_bytes(changed)
     reader = TrafficReader(path)
-    found = [int.from_bytes(message.data[:4], "little") for message in reader.messages()]
+    messages = list(reader.messages())
+    found = [message.sequence for message in messages]
     lost = set(range(len(made.topics))) - set(found)
     wrong = []
     if found != sorted(set(found)) or not set(found) <= set(range(len(made.topics))):
         wrong.append("messages that are none, twice, or out of order")
+    elif any(one.data != made.data[one.sequence] or one.topic != made.topics[one.sequence] for one in messages):
+        wrong.append("messages that are changed")
     if lost and len({made.chunks[number] for number in lost}) > 1:
         wrong.append("more than one chunk")
     if reader.loss.missing_messages != len(lost):
@@ -117,31 +132,43 @@ def read_flipped(made: Recording, place: int, by: int, path: Path) -> tuple[set[
 
 
 def main() -> None:
-    """Change bytes at random places of a whole and of a truncated recording."""
+    """Change bytes at random places."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--places", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--recording", type=Path)
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
-    for whole in (True, False):
-        with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder:
+        if asked.recording is not None:
+            made = read_recording(asked.recording)
+            for number in (0, len(made.spans) // 2):
+                places = random.integers(*made.spans[number], asked.places // 2)
+                _tell(f"chunk {number} of a session", made, places, random, Path(folder))
+            return
+        for whole in (True, False):
             made = make_recording(Path(folder), whole=whole)
-            bad: Counter[str] = Counter()
-            most = 0
-            for _ in range(asked.places):
-                place, by = int(random.integers(len(made.content))), int(random.integers(1, 256))
-                try:
-                    lost, wrong = read_flipped(made, place, by, Path(folder) / "flipped.mcap")
-                except Exception as error:
-                    lost, wrong = set(), f"{type(error).__name__}: {error}"
-                most = max(most, len(lost))
-                if wrong:
-                    bad[f"{wrong} (at {place} of {len(made.content)}, chunk {made.chunk_at(place)}, by {by})"] += 1
-        kind = "whole" if whole else "torn"
-        figures = f"at most {most} messages lost, {bad.total()} told wrongly"
-        print(f"{kind}: {asked.places} flips in {len(made.spans)} chunks, {figures}")
-        for words, number in bad.most_common(20):
-            print(f"  {number} x {words}")
+            places = random.integers(len(made.content), size=asked.places)
+            _tell("whole" if whole else "torn", made, places, random, Path(folder))
+
+
+def _tell(kind: str, made: Recording, places: np.ndarray, random: np.random.Generator, folder: Path) -> None:
+    bad: Counter[str] = Counter()
+    most = beyond = 0
+    for place in map(int, places):
+        by = int(random.integers(1, 256))
+        try:
+            lost, wrong = read_flipped(made, place, by, folder / "flipped.mcap")
+        except Exception as error:
+            lost, wrong = set(), f"{type(error).__name__}: {error}"
+        most = max(most, len(lost))
+        beyond = max(beyond, sum(made.chunks[number] != made.chunk_at(place) for number in lost))
+        if wrong:
+            bad[f"{wrong} (at {place} of {len(made.content)}, chunk {made.chunk_at(place)}, by {by})"] += 1
+    figures = f"at most {most} messages lost, {beyond} beyond the damaged chunk, {bad.total()} told wrongly"
+    print(f"{kind}: {len(places)} flips in {len(made.spans)} chunks, {figures}")
+    for words, number in bad.most_common(20):
+        print(f"  {number} x {words}")
 
 
 if __name__ == "__main__":

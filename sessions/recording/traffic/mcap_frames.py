@@ -20,6 +20,7 @@ from mcap.writer import MCAP0_MAGIC
 _FRAME = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQII")  # begins, ends, bytes unpacked, checksum, length of what follows: the packing
 _CHUNK_BYTES = _CHUNK_HEAD.size + len(b"zstd") + 8  # of a chunk besides its records
+_MESSAGE_BYTES = 22  # of a message besides its data
 _TEXT, _LONG = struct.Struct("<I"), struct.Struct("<Q")  # lengths of a text and of an attachment
 _OPCODES = frozenset(range(Opcode.HEADER, Opcode.DATA_END + 1))
 _BLOCK_BYTES = 1 << 20
@@ -109,7 +110,12 @@ class Frames:
         return start + _FRAME.size + _CHUNK_BYTES + int(length)
 
     def _agrees(self, opcode: int, start: int, length: int) -> bool:
-        """Whether the lengths inside of a record's content come to its own; of kinds without any, always."""
+        """Whether the lengths inside of a record's content come to its own; of kinds without any, always.
+
+        Messages without even a stamp would be millions to a file that has nothing in it.
+        """
+        if opcode == Opcode.MESSAGE:
+            return length >= _MESSAGE_BYTES
         if opcode == Opcode.HEADER:
             filled = self._past_text(self._past_text(start))
         elif opcode == Opcode.MESSAGE_INDEX:

@@ -10,6 +10,7 @@ from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, 
 from tactile_lab.slam.doubt.signs import signs
 from tactile_lab.slam.doubt.status import (
     LARGEST_REFUSED_SHARE,
+    LEAST_GRASPS,
     LEAST_KNOWN_SHARE,
     Alternative,
     Doubt,
@@ -77,14 +78,14 @@ def assess(
         *signs(contact_map, settings.motion, poses_given=settings.method == "known-pose"),
         *doubts_of(others),
         *_refused(refused),
+        *_few(len(refused) - sum(refused)),
         *(
             [Doubt("symmetry", symmetry.words, grave=False)]
             if symmetry is not None and symmetry.interchangeable
             else []
         ),
     )
-    refused_share = sum(refused) / max(len(refused), 1)
-    status = status_of(lost=lost, known_share=share, refused_share=refused_share, doubts=doubts)
+    status = status_of(lost=lost, known_share=share, doubts=doubts)
     return Assessment(status, shape, share, doubts, others)
 
 
@@ -112,3 +113,10 @@ def _refused(refused: Sequence[bool]) -> list[Doubt]:
         return []
     words = f"{len(grasps)} of {len(refused)} grasps could not be placed: the object may have been elsewhere then"
     return [Doubt("refused-grasps", words, grasps, grave=False)]
+
+
+def _few(placed: int) -> list[Doubt]:
+    if placed >= LEAST_GRASPS:
+        return []
+    words = f"only {placed} grasp{'' if placed == 1 else 's'} could be placed: nothing confirms the shape"
+    return [Doubt("few-grasps", words, grave=False)]

@@ -32,6 +32,9 @@ one grasp of sixteen that is a centimetre off changes neither the shape nor the 
 
 _LEAST_TOLD = 0.01
 _LEAST_SHIFT_m = 0.005
+_SYMMETRIC_m = 0.010
+"""Left of a turn by a symmetry: the grasp is a little off at its other place too."""
+
 _SAME_m = 0.004
 _FARTHEST_nats = 8.0
 _MOST_TURNED = 4
@@ -139,7 +142,7 @@ def _all_turns(best: ContactMap, rows: Array, moved: Sequence[int], symmetry: Sy
     if best.space is not PLANAR:
         return False
     offsets = PLANAR.compose(PLANAR.inverse(best.rows), rows)
-    return all(symmetry.explains(offsets[index], _LEAST_SHIFT_m) for index in moved)
+    return all(symmetry.explains(offsets[index], _SYMMETRIC_m) for index in moved)
 
 
 def _alternative(

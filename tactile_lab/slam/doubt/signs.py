@@ -89,9 +89,15 @@ def _jumps(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     space, rows = contact_map.space, contact_map.rows
     expected = space.compose(contact_map.motions[1:], rows[:-1])
     away_m = np.linalg.norm(space.deviation(rows[1:], expected)[:, : space.translations], axis=1)
+    alone = np.array([how is Moved.FREELY for how in contact_map.moved[1:]], dtype=bool)
     return [
-        Doubt("jump", f"the object jumps by {1e3 * away_m[step]:.0f} mm before grasp {step + 2}", (int(step) + 1,))
-        for step in np.flatnonzero(away_m > _JUMP_m)
+        Doubt(
+            "jump",
+            f"the object is {1e3 * away_m[step]:.0f} mm from where the hand left it before grasp {step + 2}: "
+            "did it fall, was it moved or exchanged?",
+            (int(step) + 1,),
+        )
+        for step in np.flatnonzero((away_m > _JUMP_m) | alone)
     ]
 
 

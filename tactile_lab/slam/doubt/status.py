@@ -17,8 +17,19 @@ from gtsam import Pose3
 Status: TypeAlias = Literal["complete", "partial", "ambiguous", "lost"]
 
 DoubtName: TypeAlias = Literal[
-    "undone-slips", "unlikely-slip", "jump", "other-object", "first-grasp", "refused-grasps", "rivals", "symmetry"
+    "undone-slips",
+    "unlikely-slip",
+    "jump",
+    "other-object",
+    "first-grasp",
+    "refused-grasps",
+    "few-grasps",
+    "rivals",
+    "symmetry",
 ]
+
+_PARTIAL: tuple[DoubtName, ...] = ("refused-grasps", "few-grasps")
+"""Doubts with which an estimate is not complete."""
 
 LEAST_KNOWN_SHARE = 0.8
 """Of a complete shape. Contacts all around a hand-sized object reach 0.95 from six grasps on; one face reaches 0.3, two
@@ -27,6 +38,9 @@ opposite faces or a corner 0.45 to 0.65.
 
 LARGEST_REFUSED_SHARE = 0.25
 """Of the grasps of a complete estimate."""
+
+LEAST_GRASPS = 3
+"""Placed ones of a complete estimate: contacts of fewer hardly confirm each other, wherever they are."""
 
 
 @dataclass(frozen=True)
@@ -74,13 +88,12 @@ class Alternative:
         return f"{which} {moved} ({self.probability:.0%})"
 
 
-def status_of(*, lost: bool, known_share: float | None, refused_share: float, doubts: Sequence[Doubt]) -> Status:
+def status_of(*, lost: bool, known_share: float | None, doubts: Sequence[Doubt]) -> Status:
     """The status, the worst that applies.
 
     Args:
         lost: whether the object could not be followed.
         known_share: share of the shape that was touched; None without a shape.
-        refused_share: share of the grasps that could not be placed.
         doubts: all of them.
     """
     if lost:
@@ -88,4 +101,4 @@ def status_of(*, lost: bool, known_share: float | None, refused_share: float, do
     if any(doubt.grave for doubt in doubts):
         return "ambiguous"
     whole = known_share is not None and known_share >= LEAST_KNOWN_SHARE
-    return "complete" if whole and refused_share <= LARGEST_REFUSED_SHARE else "partial"
+    return "complete" if whole and all(doubt.name not in _PARTIAL for doubt in doubts) else "partial"

@@ -10,7 +10,6 @@ from pydantic import Field
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
-from skimage.measure import approximate_polygon
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
@@ -58,6 +57,8 @@ def contour_segments(contour_m: Array, settings: FaceSettings) -> Segments:
 
     Douglas-Peucker needs a point to start from: the one farthest from the centre, most likely a corner.
     """
+    from skimage.measure import approximate_polygon  # here, so that importing this module stays quick
+
     corner = int(np.argmax(np.sum((contour_m - contour_m.mean(axis=0)) ** 2, axis=1)))
     ring = np.roll(contour_m, -corner, axis=0)
     polygon = approximate_polygon(np.vstack([ring, ring[:1]]), settings.tolerance_m)  # type: ignore[no-untyped-call]

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import gtsam
 import numpy as np
 from pydantic import Field
-from scipy.stats import chi2
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.core.poses import planar
+from tactile_lab.slam.graph.chi_squared import chi_squared_quantile
 from tactile_lab.slam.graph.faces import Labels
 from tactile_lab.slam.graph.registration import Alignment, align
 from tactile_lab.slam.graph.relative_poses import RelativePose
@@ -140,13 +140,13 @@ def _tested_loop(
 
 
 def _test_limit(settings: PoseGraphSettings) -> float:
-    return float(chi2.ppf(settings.confidence, 3))
+    return chi_squared_quantile(settings.confidence, 3)
 
 
 def _judge(shared: SharedContacts, alignment: Alignment, value: float, settings: PoseGraphSettings) -> tuple[bool, str]:
     """Whether a loop is accepted, and why."""
     limit = _test_limit(settings)
-    fit_limit = float(chi2.ppf(settings.confidence, max(alignment.degrees_of_freedom, 1)))
+    fit_limit = chi_squared_quantile(settings.confidence, max(alignment.degrees_of_freedom, 1))
     if not shared.similar:
         return False, shared.reason
     if not alignment.observable:

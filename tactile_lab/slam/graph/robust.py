@@ -23,10 +23,10 @@ import gtsam
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.stats import chi2
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
+from tactile_lab.slam.graph.chi_squared import chi_squared_quantile
 from tactile_lab.slam.graph.heading_hypotheses import heading_hypotheses
 from tactile_lab.slam.graph.least_squares import covariance_of, gtsam_problem, solve, squared_distances
 from tactile_lab.slam.graph.relative_poses import RelativePose, chain, jacobians, residuals
@@ -132,7 +132,7 @@ class _Problem:
         self, odometry: Sequence[RelativePose], loops: Sequence[RelativePose], settings: RobustSettings, first: Array
     ) -> None:
         self.odometry, self.loops, self.settings, self.first = odometry, loops, settings, first
-        self.limit = float(chi2.ppf(settings.confidence, 3))
+        self.limit = chi_squared_quantile(settings.confidence, 3)
         self.noises = np.array([loop.covariance for loop in loops]).reshape(-1, 3, 3)
         self.large = len(odometry) + 1 > settings.most_nodes
 

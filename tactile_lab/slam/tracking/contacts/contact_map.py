@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,6 +97,15 @@ class ContactMap:
     space: PoseVectors = PLANAR
     archive: tuple[PlacedGrasp, ...] = ()
     settled_cost: float = 0.0
+
+    def without_field(self) -> Self:
+        """The same map without what it has computed: the field takes most of the memory of an estimation."""
+        return replace(self)
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Self:
+        """Copies share the grasps, which never change, and compute their field themselves."""
+        copied = memo[id(self)] = self.without_field()
+        return copied
 
     @property
     def dimension(self) -> int:

@@ -151,12 +151,18 @@ class HypothesisScorer:
 
     def _information(self, contact_map: ContactMap) -> Array:
         """Information of all poses but the first; cached for the last maps."""
-        if id(contact_map) not in self._informed:
-            while len(self._informed) >= _REMEMBERED:
-                del self._informed[next(iter(self._informed))]
-            found = PoseEvidence(contact_map, self._noise).information(contact_map.rows)
-            self._informed[id(contact_map)] = contact_map, found
-        return self._informed[id(contact_map)][1]
+        known = self._informed.get(id(contact_map))
+        if known is not None and known[0] is contact_map:
+            return known[1]
+        while len(self._informed) >= _REMEMBERED:
+            del self._informed[next(iter(self._informed))]
+        found = PoseEvidence(contact_map, self._noise).information(contact_map.rows)
+        self._informed[id(contact_map)] = contact_map, found
+        return found
+
+    def forget(self) -> None:
+        """Drop what was cached: the maps of a step are not compared with those of the next."""
+        self._informed.clear()
 
     def price(self, contact_map: ContactMap) -> float:
         """Cost of the contacts that are left out, and of the steps in which the object did not move with the hand.

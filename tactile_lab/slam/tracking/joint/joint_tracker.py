@@ -48,6 +48,9 @@ _LEAST_FOR_FACES = 3
 _MOST_REGROUPINGS = 3
 """A trajectory with several wrong turns is repaired at one after the other."""
 
+_LARGE_FIELD = 150
+"""Contacts; in the plane its factor takes 1.6 MB, and four times as much for twice as many."""
+
 _BACKWARD_SPREAD = {2: (4, 8), 3: (3, 4)}
 """Hypotheses kept, and branches smoothed, when a session is read backwards, by the dimension of the contacts: the
 second pass need not be as thorough as the first, and in space it costs as much.
@@ -186,6 +189,9 @@ class JointTracker:
         lag = self._settings
         if count > 2 * lag.window:
             self._hypotheses = [self._scorer.condense(one, lag.window, lag.remembered) for one in self._hypotheses]
+        self._hypotheses = [_stored(one) for one in self._hypotheses]
+        self._branches = self._hypotheses
+        self._scorer.forget()
 
     def adopt(self, corrected: ContactMap) -> None:
         """Accept other kernel parameters; the poses are smoothed already."""
@@ -317,3 +323,9 @@ class JointTracker:
     def _share_best_kernel(self) -> None:
         best = self._hypotheses[0].map.with_best_kernel()
         self._hypotheses = [replace(one, map=replace(one.map, settings=best.settings)) for one in self._hypotheses]
+
+
+def _stored(hypothesis: Hypothesis) -> Hypothesis:
+    """The hypothesis as it waits for the next grasp: a large field is sooner computed again than kept."""
+    large = len(hypothesis.map.contacts) > _LARGE_FIELD
+    return replace(hypothesis, map=hypothesis.map.without_field()) if large else hypothesis

@@ -1,7 +1,7 @@
 """Covariances of a finished trajectory's poses: in the object frame of the first grasp, and in the best common one.
 
 A smooth field with a long kernel states covariances that are too small. Flat faces whose places are estimated with the
-poses do not, not even of round objects, so they are used wherever contacts form any (docs/results: coverage).
+poses do not, not even of round objects, so they are used wherever contacts form any (decision 53).
 
 The object frame is born at the first grasp, whose pose is therefore given. An error of that grasp is an error of all
 other poses in the same direction; in the frame in which all grasps agree best it counts as one of many.

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field as Limit
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
@@ -213,9 +213,11 @@ def _distinct(rows: Array, cost: Array, settings: ProposalSettings, space: PoseV
 
 @cache
 def _sobol_normals(count: int, size: int) -> Array:
+    from scipy.stats import qmc  # here: it takes a fifth of the time in which a session starts
+
     exponent = int(np.ceil(np.log2(count)))
     uniform = qmc.Sobol(size, scramble=True, rng=np.random.default_rng(0)).random_base2(exponent)[:count]
-    return np.asarray(norm.ppf(np.clip(uniform, 1e-6, 1 - 1e-6)))
+    return np.asarray(ndtri(np.clip(uniform, 1e-6, 1 - 1e-6)))
 
 
 def quasi_normal(count: int, size: int) -> Array:

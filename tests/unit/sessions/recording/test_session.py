@@ -4,6 +4,7 @@ import errno
 import hashlib
 import os
 import shutil
+import signal
 from datetime import UTC, datetime
 
 import pytest
@@ -15,6 +16,7 @@ from sessions.recording.listing import find_session, list_sessions, summarize
 from sessions.recording.manifest import Manifest, read_manifest, write_manifest
 from sessions.recording.session import Session, create_session
 from sessions.recording.traffic import disk as traffic_disk
+from sessions.recording.traffic.writer import TrafficWriter
 
 START = datetime(2026, 11, 21, 9, 30, 0, tzinfo=UTC)
 
@@ -270,3 +272,22 @@ def test_a_folder_that_goes_while_it_is_recorded_is_told_and_not_made_again(tmp_
     assert not session.folder.exists()
     if not removed:
         assert next(Session.open(tmp_path / "elsewhere").traffic().messages()).data == b"bytes"
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_an_interruption_while_a_session_is_closed_waits_until_its_status_is_written(tmp_path, monkeypatch, times):
+    finish = TrafficWriter.close
+
+    def interrupted_while_the_disk_is_slow(writer, end):
+        for _ in range(times):
+            signal.raise_signal(signal.SIGINT)
+        finish(writer, end)
+
+    session = create(tmp_path)
+    monkeypatch.setattr(TrafficWriter, "close", interrupted_while_the_disk_is_slow)
+    with pytest.raises(KeyboardInterrupt):
+        session.close("interrupted")
+    monkeypatch.undo()
+    assert read_manifest(session.folder).status == ("interrupted" if times == 1 else "open")  # twice: at once
+    session.close("interrupted")
+    assert read_manifest(session.folder).status == "interrupted"

@@ -170,6 +170,7 @@ def test_a_session_is_the_same_wherever_it_thinks() -> None:
     assert here == there
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_a_killed_process_ends_the_session_in_order_and_no_grasp_is_lost() -> None:
     run = Run(BriefClock(), slam())
     stops = run.world.hand.stops
@@ -186,6 +187,7 @@ def test_a_killed_process_ends_the_session_in_order_and_no_grasp_is_lost() -> No
     assert run.slam.world_T_object is not None
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_ctrl_c_finishes_the_grasp_with_its_estimate() -> None:
     run = Run(BriefClock(), slam())
     outcome = run.go(Acts(1, "estimate", lambda: os.kill(os.getpid(), signal.SIGINT)))
@@ -198,6 +200,7 @@ def test_ctrl_c_finishes_the_grasp_with_its_estimate() -> None:
     ]
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_a_step_that_fails_ends_the_session_in_order_and_the_record_says_where() -> None:
     run = Run(VirtualClock(), questions.StumblingSlam(SlamSettings(particles=200), seed=1))
     assert isinstance(run.roles.estimator, LocalClient)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import numpy as np
 from gtsam import Pose3
 
@@ -56,6 +58,23 @@ def test_grasps_are_taken_back_farther_than_states_are_kept() -> None:
         assert one is not None
         assert other is not None
         np.testing.assert_array_equal(one.matrix(), other.matrix())
+
+
+def test_what_is_remembered_for_undo_is_without_the_fields() -> None:
+    slam = TactileSlam(seed=0)
+    memory = SlamMemory(slam)
+    for grasp in simulate("rectangle", 50, count=4).grasps:
+        memory.remember(grasp)
+        slam.add_grasp(grasp)
+        assert slam.surface is not None
+    trackers = [state["_tracker"] for state in memory._states]
+    maps = [one.map for tracker in trackers for one in tracker.hypotheses]
+    assert maps
+    assert not any("_field" in vars(contact_map) for contact_map in maps)
+    copied = copy.deepcopy(slam)
+    assert copied.surface is not slam.surface
+    assert copied.surface is not None
+    np.testing.assert_array_equal(copied.surface.contacts_m, slam.surface.contacts_m)  # type: ignore[union-attr]
 
 
 def test_the_service_keeps_no_surface_that_the_session_has() -> None:

@@ -16,12 +16,12 @@ from mcap_protobuf.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionError
 from sessions.exchange.sample_tables import SampleTables
 from tactile_lab.viewers import cdr
 from tactile_lab.viewers.foxglove_file import write_foxglove
 from tactile_lab.viewers.items import Item, Surface
-from tactile_lab.viewers.rerun_file import write_rerun
+from tactile_lab.viewers.rerun_file import show_in_rerun, write_rerun
 from tactile_lab.viewers.robot import CAMERA, OBJECT, WORLD, Robot
 from tactile_lab.viewers.ros_bag import write_ros_bag
 from tests.support import told_session
@@ -222,3 +222,13 @@ def test_a_session_without_a_shape_gives_everything_else(tmp_path):
 
     assert write_foxglove(tmp_path / "a.mcap", Shapeless(), {}) > 20
     assert write_ros_bag(tmp_path / "bag", Shapeless().robot, Shapeless(), SampleTables()) > 10
+
+
+@pytest.mark.parametrize("address", ["rerun+http://127.0.0.1:9/proxy", "rerun+http://127.0.0.1:nine/proxy"])
+def test_a_rerun_viewer_that_is_not_there_is_told_before_anything_is_computed(address):
+    class Untouched(ToldItems):
+        def __iter__(self) -> Iterator[Item]:
+            raise AssertionError("computed")
+
+    with pytest.raises(ConfigurationError, match="its viewer cannot be reached"):
+        show_in_rerun(Untouched(), "told", address)

@@ -11,12 +11,14 @@ from typing import Any
 
 import foxglove
 import pytest
+import typer
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from drivers.core.errors import DeviceError
 from tactile_lab import process_feed
+from tactile_lab.cli.running.live_address import LIVE_PORT, LiveAddress
 from tactile_lab.process_feed import QUEUE_LENGTH
 from tactile_lab.viewers.live.door import Door
 from tactile_lab.viewers.live.feed import LiveFeed
@@ -221,3 +223,10 @@ def test_a_port_that_is_taken_is_said_in_one_sentence(feed):
     ):
         pass
     assert "Choose another --live-port" in str(refused.value)
+
+
+@pytest.mark.parametrize(("port", "origin"), [(1, ""), (LIVE_PORT, "https://lab.example")])
+def test_options_of_the_server_need_the_server(port, origin):
+    with pytest.raises(typer.BadParameter, match="needs --live"):
+        LiveAddress.if_wanted(False, "sim", port, "", origin)
+    assert LiveAddress.if_wanted(False, "sim", LIVE_PORT, "", "") is None

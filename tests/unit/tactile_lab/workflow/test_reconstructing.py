@@ -171,7 +171,7 @@ def test_inward_normals_that_reach_the_estimation_give_no_certain_shape(method: 
 
 @pytest.mark.parametrize("method", ["joint", "particle", "thesis-pf-graph", "icp", "odometry"])
 def test_a_single_grasp_and_an_empty_one_at_the_end_are_survived(method: str) -> None:
-    assert taken(DATA.grasps[:1], method=method, particles=500).status != "lost"
+    assert taken(DATA.grasps[:1], method=method, particles=500).status == "partial"
     empty = replace(DATA.grasps[3], contacts=())
     result = taken((*DATA.grasps[:3], empty), method=method, particles=500)
     assert result.steps[3].verdict == "untracked"

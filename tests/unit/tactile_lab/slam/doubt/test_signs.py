@@ -9,7 +9,7 @@ import pytest
 
 from tactile_lab.slam.doubt.signs import signs
 from tactile_lab.slam.doubt.status import Doubt, status_of
-from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tests.support.simulated_contacts import true_map
 
@@ -60,6 +60,12 @@ def test_a_jump_of_ten_centimetres_is_told(true: ContactMap) -> None:
     assert names(turned(true, slice(6, None), (0.12, 0.0, 0.0)), poses_given=True) == set()
 
 
+def test_a_step_in_which_the_object_did_not_follow_the_hand_is_a_jump_however_short(true: ContactMap) -> None:
+    freely = true.with_placed(6, replace(true.placed[6], moved=Moved.FREELY))
+    (found,) = signs(freely, NOISE)
+    assert (found.name, found.grasps, found.grave) == ("jump", (6,), True)
+
+
 def test_contacts_that_fit_up_to_some_grasp_only_are_of_another_object(true: ContactMap) -> None:
     (found,) = signs(leaving_out(true, range(7, 12), 3), NOISE)
     assert (found.name, found.grasps) == ("other-object", (7, 8, 9, 10, 11))
@@ -73,16 +79,18 @@ def test_wrong_contacts_of_the_first_grasp_are_told_and_two_are_grave(true: Cont
 
 
 @pytest.mark.parametrize(
-    ("share", "refused", "grave", "status"),
+    ("share", "doubt", "status"),
     [
-        (0.95, 0.0, False, "complete"),
-        (0.62, 0.0, False, "partial"),
-        (None, 0.0, False, "partial"),
-        (0.95, 0.5, False, "partial"),
-        (0.62, 0.0, True, "ambiguous"),
+        (0.95, None, "complete"),
+        (0.95, Doubt("symmetry", "the object is round", grave=False), "complete"),
+        (0.62, None, "partial"),
+        (None, None, "partial"),
+        (0.95, Doubt("refused-grasps", "4 of 8 grasps could not be placed", grave=False), "partial"),
+        (0.95, Doubt("few-grasps", "only 1 grasp could be placed", grave=False), "partial"),
+        (0.62, Doubt("jump", "the object jumps"), "ambiguous"),
     ],
 )
-def test_the_worst_status_that_applies(share: float | None, refused: float, grave: bool, status: str) -> None:
-    doubts = [Doubt("jump", "the object jumps", grave=grave)]
-    assert status_of(lost=False, known_share=share, refused_share=refused, doubts=doubts) == status
-    assert status_of(lost=True, known_share=share, refused_share=refused, doubts=doubts) == "lost"
+def test_the_worst_status_that_applies(share: float | None, doubt: Doubt | None, status: str) -> None:
+    doubts = [] if doubt is None else [doubt]
+    assert status_of(lost=False, known_share=share, doubts=doubts) == status
+    assert status_of(lost=True, known_share=share, doubts=doubts) == "lost"
