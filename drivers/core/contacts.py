@@ -68,6 +68,19 @@ class ApproachPath:
 
 
 @dataclass(frozen=True)
+class StepSigma:
+    """How well the object's motion between two grasps is known: standard deviations.
+
+    Attributes:
+        translation_m: per axis.
+        rotation_rad: about each axis.
+    """
+
+    translation_m: float
+    rotation_rad: float
+
+
+@dataclass(frozen=True)
 class Grasp:
     """The contacts of one closing, and how the hand carried the object since the last one.
 
@@ -76,10 +89,11 @@ class Grasp:
         stamp_ns: time in the middle of the capture, session clock.
         contacts: at most one contact per finger from the closing, followed by those probed before it.
         world_T_palm: the palm's pose at capture; the first one defines the axes of the object frame.
-        hand_motion_world: how the hand moved while it held the object since the previous grasp, so that
-            predicted ``world_T_object = hand_motion_world * previous world_T_object`` (eq. 3.8); identity
-            in the first grasp.
-        closing_lines: the fingers' approach paths, including those of fingers that met nothing; empty if unknown.
+        hand_motion_world: how the hand has moved the object since the previous grasp, so that predicted
+            ``world_T_object = hand_motion_world * previous world_T_object`` (eq. 3.8): as the fingertips felt it, or
+            as the palm moved; identity in the first grasp, and where the object was left in place.
+        approach_paths: the fingers' approach paths, including those of fingers that met nothing; empty if unknown.
+        motion_sigma: of that motion; None where only the rig's usual slip is known.
     """
 
     index: int
@@ -88,6 +102,7 @@ class Grasp:
     world_T_palm: Pose3 = field(default_factory=Pose3)
     hand_motion_world: Pose3 = field(default_factory=Pose3)
     approach_paths: tuple[ApproachPath, ...] = ()
+    motion_sigma: StepSigma | None = None
 
     @property
     def touching(self) -> frozenset[str]:

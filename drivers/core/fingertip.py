@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Protocol
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from gtsam import Pose3, Rot3
+from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from drivers.core.calibration_file import load_parameters
@@ -63,6 +64,38 @@ class TipContact:
     normal_sigma_rad: float
     force_N: float
     torsion_Nm: float
+
+
+@dataclass(frozen=True)
+class TipTouches:
+    """What one fingertip felt at several moments, in the finger's distal frame.
+
+    Attributes:
+        points_distal_m: contact points, shape (n, 3); zero where :attr:`is_certain` is false.
+        normals_distal: unit normals out of the *object*, shape (n, 3); zero likewise.
+        normal_forces_N: force along the normal, shape (n,); zero likewise.
+        forces_distal_N: force of the object on the fingertip, shape (n, 3); zero likewise.
+        is_certain: whether the reading was that of one contact, shape (n,).
+        is_void: whether the reading was no measurement (saturated, faulty), shape (n,).
+    """
+
+    points_distal_m: Array
+    normals_distal: Array
+    normal_forces_N: Array
+    forces_distal_N: Array
+    is_certain: NDArray[np.bool_]
+    is_void: NDArray[np.bool_]
+
+
+@runtime_checkable
+class ContinuousFingertip(Protocol):
+    """A fingertip that tells its contact at any moment, also while it moves (a force sensor does)."""
+
+    def reading(self) -> Array:
+        """The newest measurement without bias, shape (6,), sensor frame; NaN if it is invalid."""
+
+    def touches(self, readings: Array, world_R_distal: Array) -> TipTouches:
+        """The contacts of readings of shape (n, 6), with the distal frame's orientation at each, shape (n, 3, 3)."""
 
 
 class FingertipSensor(Protocol):

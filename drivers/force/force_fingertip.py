@@ -14,7 +14,7 @@ import numpy as np
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
-from drivers.core.fingertip import GRAVITY, FingertipCalibration, TipContact
+from drivers.core.fingertip import GRAVITY, FingertipCalibration, TipContact, TipTouches
 from drivers.force.force_samples import ForceTipSettings, Tare, WrenchSample
 from drivers.force.intrinsic_contact import (
     EllipsoidContact,
@@ -25,6 +25,7 @@ from drivers.force.intrinsic_contact import (
 )
 from drivers.force.plausibility import WrenchMonitor, objection
 from drivers.force.sequences import SequenceMonitor
+from drivers.force.touches import tip_touches
 
 __all__ = ["AXES", "CAPTURE_LIMIT", "ForceTip", "ForceTipSettings", "Tare", "WrenchSample"]
 
@@ -166,6 +167,19 @@ class ForceTip:
         if verdict or self._judge.fault:
             return None
         return self._tip_contact(contact, force, self._mean_covariance(window))
+
+    def reading(self) -> Array:
+        """See :meth:`~drivers.core.fingertip.ContinuousFingertip.reading`."""
+        if self.newest is None or not self._newest_usable or self.overload:
+            return np.full(6, np.nan)
+        return np.asarray(self.newest.wrench - self._bias)
+
+    def touches(self, readings: Array, world_R_distal: Array) -> TipTouches:
+        """See :meth:`~drivers.core.fingertip.ContinuousFingertip.touches`; the same checks as for a capture."""
+        is_void = np.asarray(~np.isfinite(readings).all(axis=-1), dtype=bool)
+        weights = -world_R_distal[:, 2] @ self._weight_from_down.T
+        wrenches = (np.where(is_void[:, None], 0.0, readings - weights)) @ self._to_centre.T
+        return tip_touches(wrenches, is_void, self.calibration, self._settings.plausibility)
 
     def health(self) -> tuple[str, ...]:
         """What is wrong with the sensor, in words; empty when all is well."""

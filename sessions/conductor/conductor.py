@@ -250,7 +250,19 @@ class Conductor:
             hand_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, touching)
             if cycle.jammed:
                 self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: re-orientation stopped early")
+            hand_motion = self._tell_carry() or hand_motion
         self._decisions.on_carry(hand_motion)
+
+    def _tell_carry(self) -> Pose3 | None:
+        """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""
+        perception = self._runtime.perception
+        if (carry := perception.carry) is None:
+            return None
+        level = Level.WARNING if carry.is_remarkable else Level.INFO
+        self._runtime.log(level, "odometry", f"the object {carry.in_words()}")
+        if carry.is_remarkable:
+            self._progress.on_message(f"the object {carry.in_words()}")
+        return perception.hand_motion_world
 
     def _let_go(self) -> None:
         if self._cycle.plan.only_touch:

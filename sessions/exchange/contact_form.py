@@ -69,7 +69,18 @@ _Angle = Annotated[float, _short(float(np.pi), "degrees")]
 
 
 class MotionSigma(StrictModel):
-    """Standard deviations of one re-orientation, per axis."""
+    """Standard deviations of one re-orientation, per axis.
+
+    ``unheld`` is the share of them that holds where the hand left the object in place.
+    """
+
+    translation_m: _Length = Field(ge=0.0)
+    rotation_rad: _Angle = Field(ge=0.0)
+    unheld: float = Field(default=1.0, gt=0.0, le=1.0)
+
+
+class StepSigmaEntry(StrictModel):
+    """Standard deviations of one grasp's ``hand_motion_world``, per axis."""
 
     translation_m: _Length = Field(ge=0.0)
     rotation_rad: _Angle = Field(ge=0.0)
@@ -123,6 +134,7 @@ class GraspEntry(StrictModel):
     stamp_s: float = 0.0
     contacts: tuple[ContactEntry, ...]
     hand_motion_world: RigidRows
+    motion_sigma: StepSigmaEntry | None = None
     world_T_palm: RigidRows | None = None
     closing_lines: tuple[LineEntry, ...] = ()
     world_T_object: RigidRows | None = None

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,7 +20,7 @@ from drivers.core.atomic_files import write_whole
 from drivers.core.clock import NANOSECONDS
 from drivers.core.configuration import validate
 from drivers.core.contact_checks import opposing_pairs
-from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, Grasp
+from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, Grasp, StepSigma
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import palm_heading, planar, spatial
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
@@ -110,7 +110,7 @@ def write_contact_log(path: Path, log: ContactLog) -> int:
         "dimension": log.dimension,
         "point_sigma_m": log.point_sigma_m,
         "normal_sigma_rad": log.normal_sigma_rad,
-        **({"motion_sigma": log.motion_sigma.model_dump()} if log.motion_sigma else {}),
+        **({"motion_sigma": log.motion_sigma.model_dump(exclude_defaults=True)} if log.motion_sigma else {}),
         **({"object": log.truth.model_dump(exclude_none=True)} if log.truth else {}),
         "grasps": grasps,
     }
@@ -149,6 +149,7 @@ def _check_normals(grasps: Sequence[Grasp], path: Path) -> None:
 
 def _grasp(index: int, entry: GraspEntry, document: Document) -> Grasp:
     contacts = tuple(_contact(contact, document) for contact in entry.contacts)
+    own = entry.motion_sigma
     return Grasp(
         index=index,
         stamp_ns=round(entry.stamp_s * NANOSECONDS),
@@ -156,6 +157,7 @@ def _grasp(index: int, entry: GraspEntry, document: Document) -> Grasp:
         world_T_palm=_optional_pose(entry.world_T_palm) or _assumed_palm(entry.points_m),
         hand_motion_world=Pose3(np.array(entry.hand_motion_world)),
         approach_paths=tuple(_closing_line(line) for line in entry.closing_lines),
+        motion_sigma=None if own is None else StepSigma(own.translation_m, own.rotation_rad),
     )
 
 
@@ -204,6 +206,8 @@ def _grasp_entry(grasp: Grasp, world_T_object: Pose3 | None, log: ContactLog) ->
         "contacts": [_contact_entry(contact, log, scale) for contact in contacts],
         "hand_motion_world": _matrix(grasp.hand_motion_world, flat=flat),
     }
+    if grasp.motion_sigma is not None:
+        entry["motion_sigma"] = asdict(grasp.motion_sigma)
     if not np.array_equal(palm.matrix(), _assumed_palm(points).matrix()):
         entry["world_T_palm"] = palm.matrix().tolist()
     if grasp.approach_paths:

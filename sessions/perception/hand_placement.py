@@ -52,6 +52,11 @@ class HandPlacement:
             raise DeviceError("no position has arrived yet", where="base", hint="Check that the positioner answers")
         return self._joints_rad, self._base_q
 
+    @property
+    def world_T_forearm(self) -> Array:
+        """The forearm by the newest positioner joints, shape (4, 4). Raises DeviceError before the first."""
+        return self._world_T_forearm(self.latest()[1])
+
     def current(self) -> HandGeometry:
         """Geometry from the newest joints. Raises DeviceError before the first."""
         if self._geometry is None:
@@ -60,6 +65,8 @@ class HandPlacement:
 
     def place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
         """Geometry from these joints."""
-        world_T_forearm = self._world_T_mount * self._mount_T_forearm(base_q)
-        world_T_palm = world_T_forearm.matrix() @ forearm_T_palm_matrix(joints_rad, self._side)
+        world_T_palm = self._world_T_forearm(base_q) @ forearm_T_palm_matrix(joints_rad, self._side)
         return HandGeometry(joints_rad, world_T_palm, self._side)
+
+    def _world_T_forearm(self, base_q: Array) -> Array:
+        return np.asarray((self._world_T_mount * self._mount_T_forearm(base_q)).matrix())

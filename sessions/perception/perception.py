@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from math import inf, isinf, isnan
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from gtsam import Pose3
@@ -21,6 +21,8 @@ from drivers.core.errors import DeviceError, SessionError
 from drivers.core.fingertip import FingertipSensor
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from sessions.perception.approach_paths import TipSurface, approach_paths
+from sessions.perception.carrying.carry import Carry
+from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.perception.hand_odometry import HandOdometry
@@ -36,10 +38,15 @@ class PerceptionSettings(StrictModel):
     Attributes:
         joint_sigma_rad: standard deviation of each joint angle that averaging does not remove (0.6 deg).
         minimum_force_N: a lighter touch does not count as a contact.
+        odometry: "touch": a held object moves as the fingertips feel it, which also says how certain that is; "palm":
+            it moves with the palm.
+        odometry_scale: factor of the standard deviations that odometry states; ``session slips`` measures it.
     """
 
     joint_sigma_rad: float = Field(default=float(np.radians(0.6)), ge=0.0)
     minimum_force_N: float = Field(default=0.1, ge=0.0)
+    odometry: Literal["touch", "palm"] = "touch"
+    odometry_scale: float = Field(default=1.0, gt=0.0, le=100.0)
 
 
 class Perception:
@@ -88,6 +95,8 @@ class Perception:
         self._closing_start: HandGeometry | None = None
         self._probed = Probed()
         self._carried = HandOdometry()
+        felt = self.fingertips if self.settings.odometry == "touch" else {}
+        self._carrying = HeldObject(felt, form.side, self.settings.odometry_scale)
 
     # --- samples -----------------------------------------------------------------------------------------------
 
@@ -102,6 +111,8 @@ class Perception:
         self.hand_stamp_ns = sample.stamp_ns
         if self._capture is not None:
             self._capture.joints_rad.append(joints_rad)
+        if self._carrying.is_watched and self._placement.ready:
+            self._carrying.on_hand(sample.stamp_ns, joints_rad, self._placement.world_T_forearm)
 
     def on_base(self, sample: BaseReading) -> None:
         """Take the positioner's joints."""
@@ -140,6 +151,11 @@ class Perception:
     def hand_motion_world(self) -> Pose3:
         """How the hand has carried the object since the last grasp, in completed holds."""
         return self._carried.motion_world
+
+    @property
+    def carry(self) -> Carry | None:
+        """What the fingertips felt in the last completed hold; None if they felt nothing that tells."""
+        return self._carrying.carry
 
     @property
     def joints_rad(self) -> Array:
@@ -222,6 +238,7 @@ class Perception:
                 return self._tare(event)
             case EventKind.CLOSE_BEGIN:
                 self._closing_start = self._placement.current()
+                self._carrying.on_left()
                 return None
             case EventKind.CAPTURE_BEGIN:
                 self._begin_capture(event)
@@ -230,13 +247,15 @@ class Perception:
                 return self._grasp(event)
             case EventKind.TOUCH_END:
                 self._probed.add(self._end_capture(event))
+                self._carrying.on_left()
                 return None
             case EventKind.HOLD_BEGIN:
                 self._carried.begin(self.world_T_palm)
+                self._carrying.on_hold(event.stamp_ns)
                 self._probed = Probed()
                 return None
             case EventKind.HOLD_END:
-                self._carried.end(self.world_T_palm)
+                self._carried.end(self.world_T_palm, self._carrying.end_hold())
                 return None
             case EventKind.TRUTH_FRAME:
                 return self._truth_frame()
@@ -245,6 +264,8 @@ class Perception:
 
     def _tare(self, event: SessionEvent) -> TareReport:
         self._placement.latest()
+        if set(self.fingertips) <= set(event.fingers):
+            self._carrying.on_left()
         self._loads_N = None
         refused = {}
         for finger in event.fingers:
@@ -261,18 +282,23 @@ class Perception:
         for fingertip in self.fingertips.values():
             fingertip.begin_capture()
         self._capture = Capture(event.stamp_ns)
+        if not self.is_holding:
+            self._carrying.on_capture(event.stamp_ns)
 
     def _grasp(self, event: SessionEvent) -> Grasp:
         measured, probed = self._end_capture(event), self._probed
         self._probed = Probed()
-        index, motion = self.grasp_count, self._carried.take(self.world_T_palm)
+        felt = self._carrying.end_hold(measured.stamp_ns) if self.is_holding else None
+        index, motion = self.grasp_count, self._carried.take(self.world_T_palm, felt)
+        self._carrying.on_grasp(measured)
         return Grasp(
             index=index,
             stamp_ns=measured.stamp_ns,
             contacts=(*measured.contacts, *probed.contacts),
             world_T_palm=Pose3(measured.world_T_palm),
-            hand_motion_world=motion if index else Pose3(),
+            hand_motion_world=motion.world if index else Pose3(),
             approach_paths=(*measured.ways, *probed.ways),
+            motion_sigma=motion.sigma if index else None,
         )
 
     def _end_capture(self, event: SessionEvent) -> Measured:

@@ -8,6 +8,7 @@ reads.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from enum import IntEnum
 from typing import Any, Protocol
 
@@ -121,6 +122,7 @@ class Recorder:
             "contacts": schemas.contacts(grasp.contacts),
             "dropped": dict(dropped),
             "hand_motion_world": foxglove.pose(grasp.hand_motion_world),
+            "motion_sigma": {} if grasp.motion_sigma is None else asdict(grasp.motion_sigma),
         }
         self._put_json(schemas.CONTACTS_TOPIC, content, stamp_ns)
         self._put_json(schemas.CLOUD_TOPIC, foxglove.contact_cloud(stamp_ns, grasp.contacts), stamp_ns)

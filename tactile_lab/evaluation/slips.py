@@ -8,7 +8,7 @@ ground truth is available.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
+from tactile_lab.evaluation.felt_slips import FeltSlips
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, deviation, planar_motion, pose_row
 from tactile_lab.slam.tracking.evidence.motion_cost import STIFF_BEYOND_SIGMA
 
@@ -38,10 +39,12 @@ class Slips:
     Attributes:
         carried: slips while the hand carried it, as (x_m, y_m, yaw_rad), world frame, shape (n, 3).
         left: slips while it was left in place, shape (m, 3).
+        felt: what odometry in the hand missed of the former.
     """
 
     carried: Array
     left: Array
+    felt: FeltSlips = field(default_factory=FeltSlips)
 
     @classmethod
     def between(cls, grasps: Sequence[Grasp], world_T_object: Sequence[Pose3 | None]) -> Slips:
@@ -52,7 +55,7 @@ class Slips:
                 motion = planar_motion(grasp.hand_motion_world)
                 expected = compose(motion, pose_row(planar(before)))
                 found[bool(motion.any())].append(deviation(pose_row(planar(after)), expected))
-        return cls(*(np.array(found[carried]).reshape(-1, 3) for carried in (True, False)))
+        return cls(np.array(found[True]).reshape(-1, 3), np.array(found[False]).reshape(-1, 3))
 
     @classmethod
     def join(cls, parts: Iterable[Slips]) -> Slips:
@@ -62,6 +65,7 @@ class Slips:
         return cls(
             np.concatenate(none + [each.carried for each in known]),
             np.concatenate(none + [each.left for each in known]),
+            FeltSlips.join(each.felt for each in known),
         )
 
     @property

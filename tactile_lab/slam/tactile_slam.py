@@ -145,7 +145,7 @@ class TactileSlam:
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         if self._tracker is None:
             return self._begin(grasp, started)
-        self._tracker.predict(self._space.motion(grasp.hand_motion_world))
+        self._tracker.predict(self._space.motion(grasp.hand_motion_world), grasp.motion_sigma)
         explained = self._tracker.weigh(contacts)
         estimate = self._tracker.estimate()
         verdict, reason = self._judge(contacts, estimate, explained)

@@ -88,7 +88,7 @@ def _common_point_sigma_m(contacts: Sequence[Contact]) -> float:
 
 
 def _motion_sigma(noise: MotionNoise) -> MotionSigma:
-    return MotionSigma(translation_m=noise.translation_m, rotation_rad=noise.rotation_rad)
+    return MotionSigma(translation_m=noise.translation_m, rotation_rad=noise.rotation_rad, unheld=noise.unheld)
 
 
 def _truth(session: Session, path: Path) -> ObjectTruth:

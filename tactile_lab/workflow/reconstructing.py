@@ -135,7 +135,7 @@ def log_settings(log: ContactLog) -> dict[str, Any]:
     found: dict[str, Any] = {"dimension": log.dimension}
     if log.motion_sigma is not None:
         stated = log.motion_sigma.model_dump()
-        found["motion"] = {key: max(value, _LEAST_MOTION[key]) for key, value in stated.items()}
+        found["motion"] = {key: max(value, _LEAST_MOTION.get(key, 0.0)) for key, value in stated.items()}
     return found
 
 

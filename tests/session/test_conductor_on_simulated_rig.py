@@ -174,9 +174,10 @@ def test_object_stays_where_it_can_be_reached(session: Session) -> None:
 
 def test_hand_motion_predicts_the_object_up_to_slip(session: Session) -> None:
     for grasp, before, after in zip(session.outcome.grasps[1:], session.truth, session.truth[1:], strict=False):
-        assert 0.2 < abs(grasp.hand_motion_world.rotation().yaw()) < 0.9
+        assert 0.1 < abs(grasp.hand_motion_world.rotation().yaw()) < 0.9
+        assert grasp.motion_sigma is not None  # the fingertips felt how it moved
         predicted_m = transform_points(grasp.hand_motion_world, before.object_origin_m[None])[0]
-        assert np.linalg.norm(predicted_m - after.object_origin_m) < 0.03
+        assert np.linalg.norm(predicted_m - after.object_origin_m) < 0.01
 
 
 def test_marks_tell_the_cycle(session: Session) -> None:

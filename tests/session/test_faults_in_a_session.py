@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.support.session_hand_faults import FAULTS, CYCLE_s, run_fault
 from tests.support.session_sweep import run_with
 
 
@@ -21,6 +22,16 @@ def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(
     swept.check(transport, fault)
     assert words in swept.ended
     assert swept.replay.startswith("read")
+
+
+@pytest.mark.parametrize("name", ["sensor at 0", "all motors silent"])
+def test_a_fault_of_the_hand_takes_its_demands_and_ends_the_session_by_name(tmp_path, name):
+    """All of them: ``python -m tests.support.session_hand_fault_table``."""
+    fault = FAULTS[name]
+    found = run_fault(fault, tmp_path)
+    assert fault.told in found.ended
+    assert "J3 (motor 1): stopped" in found.ended or "and 9 other motors" in found.ended
+    assert found.driven_s <= fault.rule_s + 2 * CYCLE_s + 1e-9
 
 
 @pytest.mark.long

@@ -18,6 +18,7 @@ from calibration.store.store import read_record, write_record
 from drivers.core.configuration import load
 from tactile_lab.experiments.data.calibration_data import TrueRig, touches_of
 from tactile_lab.experiments.runs.calibration_runs import GEOMETRY
+from tests.support.stream_table import HAND_Hz, TARGET_Hz, simulated_streams
 
 RIGS = Path(str(resources.files("tactile_lab.rigs")))
 
@@ -155,3 +156,35 @@ def test_a_session_on_an_expired_calibration_is_refused_or_says_that_it_was_allo
     (session,) = (tmp_path / "runs").iterdir()
     (overlooked,) = load(session / "session.yaml")["settings"]["uncalibrated"]
     assert "forearm calibration" in overlooked
+
+
+@pytest.mark.parametrize(("rig", "form"), [("sim-left", "left hand"), ("sim-lite", "right hand with FF, MF, RF, TH")])
+@pytest.mark.parametrize(
+    "words",
+    [("forearm", "--method", "touch"), ("forearm", "--method", "marker"), ("joints",), ("fingertip", "--finger", "FF")],
+    ids=" ".join,
+)
+def test_calibrations_that_move_another_hand_are_refused_by_name(inside, tmp_path, rig, form, words):
+    answer = inside("calibrate", *words, "--rig", rig, "--out", tmp_path / "found.yaml", "--no-input")
+    assert (answer.code, f"has a {form}" in answer.err) == (2, True), answer.err
+    assert "calibrations that move the hand are made for right hands with five fingers" in answer.err
+    assert files(tmp_path) == []
+
+
+def test_poses_of_another_program_are_solved_for_a_hand_of_any_form(inside, tmp_path):
+    streams = simulated_streams(7, 0.3, stamped=False)
+    content = {
+        name: {"rate_hz": rate, "poses": [pose.matrix().tolist() for pose in stream.poses]}
+        for name, rate, stream in (
+            ("mount_T_hand", HAND_Hz, streams.mount_T_hand),
+            ("camera_T_target", TARGET_Hz, streams.camera_T_target),
+        )
+    }
+    source = tmp_path / "streams.json"
+    source.write_text(json.dumps({"format": "tactile-pose-streams/1", "most_poses": 20, **content}))
+    answer = inside(
+        "calibrate", "forearm", "--rig", "sim-lite", "--from", source, "--out", tmp_path / "found.yaml", "--no-input"
+    )
+    assert answer.code == 0, answer.err
+    details = read_record(tmp_path / "found.yaml").details
+    assert details["delay_s"] == pytest.approx(5.0, abs=0.01)  # the hand's stream began 5 s sooner

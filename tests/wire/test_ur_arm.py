@@ -16,7 +16,7 @@ from gtsam import Pose3
 from drivers.core.clock import MonotonicClock, VirtualClock
 from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
-from drivers.emulators.ur.control_box import ControlBox
+from drivers.emulators.ur.control_box import ControlBox, Series
 from drivers.emulators.ur.host import PlantForearm, UrHost
 from drivers.emulators.ur.rtde_server import package
 from drivers.positioner.ur.device import UrPositioner
@@ -53,11 +53,11 @@ class FreePlant:
 class Served:
     """A box on its ports, and a device that reaches it through the package."""
 
-    def __init__(self, number: int) -> None:
+    def __init__(self, number: int, series: Series = "e") -> None:
         self.clock, self.plant = MonotonicClock(), FreePlant()
         self.host = f"127.{1 + os.getpid() % 250}.{os.getpid() // 250 % 250}.{number}"
         self._time = VirtualClock()
-        self.box = ControlBox(PlantForearm(self.plant, Pose3()), self._time, pose_of(TOOL), 4.6)
+        self.box = ControlBox(PlantForearm(self.plant, Pose3()), self._time, pose_of(TOOL), 4.6, series)
         self._server, self._ending = UrHost(self.box, self.host), threading.Event()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()
@@ -136,6 +136,17 @@ def test_an_arm_is_moved_stopped_resumed_led_and_lost(served: Served) -> None:
     served.stopped_with("not heard any more; it stops by itself")
     assert box.stopped_ns is not None  # by its own watchdog
     box.befall("plug")
+
+
+def test_an_arm_of_the_cb3_series_is_moved() -> None:
+    """It is told from its version, knows no remote control, and sends 125 times a second at most."""
+    served = Served(21, "cb3")
+    try:
+        served.device.connect()
+        assert (served.box.payload_kg, served.box.output("runtime_state")) == (4.6, 2)
+        served.run_until(served.is_at(THERE), THERE)
+    finally:
+        served.close()
 
 
 def test_an_arm_whose_inputs_another_program_holds_is_refused(served: Served) -> None:

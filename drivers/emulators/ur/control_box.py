@@ -57,6 +57,7 @@ class ControlBox:
         self._flange_T_forearm = flange_T_forearm
         self._flange_T_tcp = Pose3()
         self.version = (5, 12, 0, 1101319) if series == "e" else (3, 15, 8, 106339)
+        self.highest_Hz = 500.0 if series == "e" else 125.0
         self.robot_mode, self.safety_bits, self.runtime_state = _RUNNING, _NORMAL, _STOPPED
         self.speed_fraction, self.remote, self.plugged = 1.0, True, True
         self.payload_kg, self.pushed_N = 0.0, 0.0

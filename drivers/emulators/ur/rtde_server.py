@@ -56,6 +56,7 @@ class Box(Protocol):
     """What the box has to tell, and takes."""
 
     version: tuple[int, int, int, int]
+    highest_Hz: float
 
     def output(self, name: str) -> Value:
         """The present value of an output."""
@@ -126,7 +127,8 @@ class RtdeClient:
         raise CodecError(f"a package of unknown kind {kind}", where="rtde")
 
     def _set_outputs(self, body: bytes) -> bytes:
-        (self._asked_hz,) = struct.unpack_from(">d", body)
+        (asked_hz,) = struct.unpack_from(">d", body)
+        self._asked_hz = min(asked_hz, self._box.highest_Hz)
         self._outputs = _names(body[8:])
         return b"\x01" + ",".join(map(type_of, self._outputs)).encode()
 

@@ -91,7 +91,14 @@ SCHEMAS: Mapping[str, Schema] = {
     TRANSFORMS_TOPIC: Schema("foxglove.FrameTransforms", fields(transforms=list_of(_TRANSFORM))),
     CONTACTS_TOPIC: Schema(
         "tactile_lab.Grasp",
-        fields(timestamp=TIME, index=INTEGER, contacts=list_of(_CONTACT), dropped=_FREE, hand_motion_world=_FREE),
+        fields(
+            timestamp=TIME,
+            index=INTEGER,
+            contacts=list_of(_CONTACT),
+            dropped=_FREE,
+            hand_motion_world=_FREE,
+            motion_sigma=_FREE,
+        ),
     ),
     CLOUD_TOPIC: Schema("foxglove.PointCloud", foxglove.POINT_CLOUD),
     SCENE_TOPIC: Schema("foxglove.SceneUpdate", foxglove.SCENE_UPDATE),

@@ -92,9 +92,15 @@ def _show(found: Slips, sessions: list[str]) -> None:
     from tactile_lab.evaluation.slips import LEAST_STEPS
 
     titles = ["the object was", "steps", "mm, rms", "mm", "°, rms", "°"]
-    rows = [_row("carried", found.carried), _row("left in place", found.left)]
+    rows = [
+        _row("carried", found.carried),
+        _row("left in place", found.left),
+        _row("carried, as felt", found.felt.missed),
+    ]
     title = f"Slips in {count(len(sessions), 'session')} (rms per axis; median / p90 / maximum)"
     show_table(title, titles, rows, right=(1, 2, 3, 4, 5))
+    if len(found.felt.missed):
+        answer(found.felt.in_words())
     motion = found.motion
     if motion is None:
         carried = count(len(found.carried), "step")
@@ -135,6 +141,7 @@ def _document(found: Slips, sessions: list[str]) -> dict[str, Any]:
         "sessions": sessions,
         "carried": found.carried.tolist(),
         "left": found.left.tolist(),
+        "felt": {"missed": found.felt.missed.tolist(), "sigmas": found.felt.sigmas.tolist(), "scale": found.felt.scale},
         "pushed": None if motion is None else found.pushed_count(motion),
         "motion": None if motion is None else _settings(motion),
     }

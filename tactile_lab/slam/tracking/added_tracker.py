@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from inspect import signature
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from drivers.core.installed.entries import explain
 from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 
 if TYPE_CHECKING:
-    from drivers.core.contacts import Array
+    from drivers.core.contacts import Array, StepSigma
     from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
     from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
     from tactile_lab.slam.tracking.tracker import Tracker
@@ -47,8 +48,15 @@ class AddedTracker:
     def refined(self) -> ContactMap:
         return self._placed(lambda: self._tracker.refined)
 
-    def predict(self, motion: Array) -> None:
-        self._ask(lambda: self._tracker.predict(motion))
+    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
+        """As the protocol says; one that does not take what was measured is not told."""
+        self._ask(lambda: self._predict(motion, measured))
+
+    def _predict(self, motion: Array, measured: StepSigma | None) -> None:
+        if "measured" in signature(self._tracker.predict).parameters:
+            self._tracker.predict(motion, measured)
+        else:
+            self._tracker.predict(motion)
 
     def weigh(self, contacts: ContactSet) -> bool:
         return bool(self._ask(lambda: self._tracker.weigh(contacts)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
@@ -25,8 +25,8 @@ class Tracker(Protocol):
     def refined(self) -> ContactMap:
         """The same with refinements that take too long for every step, for the shape shown between grasps."""
 
-    def predict(self, motion: Array) -> None:
-        """Move the belief by the hand's motion (eq. 3.7)."""
+    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
+        """Move the belief by the hand's motion (eq. 3.7), known as well as ``measured`` says."""
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Weight the belief by a grasp's contacts in the world (eq. 3.6); returns False if nothing fits."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose3
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -35,6 +35,7 @@ class OdometryTracker:
     def __init__(self, first: ContactMap, noise: MotionNoise) -> None:
         self._map, self._noise = first, noise
         self._motion, self._trusted = np.zeros(first.space.size), True
+        self._motion_sigma: StepSigma | None = None
         self._now = PoseEstimate(first.placed[-1].row, first.placed[-1].covariance)
 
     @property
@@ -45,12 +46,14 @@ class OdometryTracker:
     def refined(self) -> ContactMap:
         return self._map
 
-    def predict(self, motion: Array) -> None:
+    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
         """Carry the pose along; its covariance goes with it, and the noise is added."""
         space, row = self._map.space, self._now.row
         moved = space.compose(motion, row)
         by_row = space.deviation(space.compose(motion, row + _STEP * np.eye(space.size)), moved).T / _STEP
-        covariance = by_row @ self._now.covariance @ by_row.T + np.diag(space.sigmas(self._noise) ** 2)
+        noise = self._noise if measured is None else self._noise.after(motion, measured)
+        covariance = by_row @ self._now.covariance @ by_row.T + np.diag(space.sigmas(noise) ** 2)
+        self._motion_sigma = measured
         self._motion, self._now = motion, PoseEstimate(moved, covariance)
 
     def weigh(self, contacts: ContactSet) -> bool:
@@ -62,7 +65,8 @@ class OdometryTracker:
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         """Contacts are added to the shape at the pose, however uncertain it is: a baseline rejects nothing."""
-        placed = PlacedGrasp(contacts, self._now.row, self._now.covariance, self._motion)
+        now, sigma = self._now, self._motion_sigma
+        placed = PlacedGrasp(contacts, now.row, now.covariance, self._motion, motion_sigma=sigma)
         self._map = self._map.with_grasp(placed if self._trusted else placed.put_aside())
 
     def resample(self) -> None:
@@ -95,8 +99,8 @@ class KnownPoseTracker(OdometryTracker):
         self._given: Array | None = None
         self._scorer = HypothesisScorer(noise, UNEXPLAINED_COST)
 
-    def predict(self, motion: Array) -> None:
-        super().predict(motion)
+    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
+        super().predict(motion, measured)
         self._given = self._ahead.pop(0) if self._ahead else None
         if self._given is not None:
             self._now = PoseEstimate(self._given, CERTAIN_VARIANCE * np.eye(len(self._given)))

@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
@@ -45,6 +45,7 @@ class PlacedGrasp:
         motion: the hand's motion since the previous grasp, as a pose vector.
         left_out: indices of the contacts that are not used; the others are part of the shape.
         moved: how the object moved since the previous grasp.
+        motion_sigma: of the motion, where it was felt; None: the usual noise.
     """
 
     contacts_world: ContactSet
@@ -53,6 +54,7 @@ class PlacedGrasp:
     motion: Array
     left_out: frozenset[int] = frozenset()
     moved: Moved = Moved.AS_MEANT
+    motion_sigma: StepSigma | None = None
 
     @cached_property
     def kept(self) -> NDArray[np.intp]:
@@ -126,6 +128,11 @@ class ContactMap:
     def moved(self) -> tuple[Moved, ...]:
         """How the object moved before each grasp."""
         return tuple(grasp.moved for grasp in self.placed)
+
+    @property
+    def motion_sigmas(self) -> tuple[StepSigma | None, ...]:
+        """The own standard deviations of each of these motions; None where it has none."""
+        return tuple(grasp.motion_sigma for grasp in self.placed)
 
     @cached_property
     def contacts(self) -> ContactSet:

@@ -7,9 +7,9 @@ from typing import Self
 
 import numpy as np
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, heavy_tailed_cost, heavy_tailed_weight
 from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
 
 STIFF_BEYOND_SIGMA = 3.2
@@ -36,7 +36,12 @@ class MotionCost:
     """Negative log probability of the slips between successive poses, up to a constant."""
 
     def __init__(
-        self, motions: Array, noise: MotionNoise, space: PoseVectors, moved: Sequence[Moved] | None = None
+        self,
+        motions: Array,
+        noise: MotionNoise,
+        space: PoseVectors,
+        moved: Sequence[Moved] | None = None,
+        measured: Sequence[StepSigma | None] = (),
     ) -> None:
         """
         Args:
@@ -45,6 +50,7 @@ class MotionCost:
             space: kind of the pose vectors.
             moved: how the object moved before each grasp, k of them; slips of steps in which it moved freely cost
                 almost nothing, and those of pushes little. None: always with the hand.
+            measured: own standard deviations of each step, k of them, where the fingertips felt it; heavy-tailed.
         """
         self._motions, self._space = motions, space
         self._stiff_beyond = STIFF_BEYOND_SIGMA if noise.gripped else np.inf
@@ -54,11 +60,16 @@ class MotionCost:
             if how is not Moved.AS_MEANT:
                 certainty[step] = 1 / _push_scale(noise) if how is Moved.PUSHED else _HARDLY
         self._weights = certainty[1:, None] / space.sigmas(noise)
+        self._is_heavy = np.zeros(len(self._weights), dtype=bool)
+        for step, own in enumerate(measured):
+            if own is not None and step and (moved is None or moved[step] is Moved.AS_MEANT):
+                self._weights[step - 1] = 1 / space.sigmas(noise.after(motions[step], own))
+                self._is_heavy[step - 1] = True
 
     @classmethod
     def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
         """Along the trajectory of a map."""
-        return cls(contact_map.motions, noise, contact_map.space, contact_map.moved)
+        return cls(contact_map.motions, noise, contact_map.space, contact_map.moved, contact_map.motion_sigmas)
 
     def value(self, rows: Array) -> float:
         """The cost of poses of shape (k, size)."""
@@ -67,35 +78,53 @@ class MotionCost:
     def steps(self, rows: Array) -> Array:
         """The cost of each step between poses of shape (k, size), shape (k - 1,)."""
         slip = self._lengths(self._scale(rows))
-        return _costs(slip, np.maximum(slip - self._stiff_beyond, 0.0))
+        return self._costs(slip, np.maximum(slip - self._stiff_beyond, 0.0))
 
     def value_and_gradient(self, rows: Array) -> tuple[float, Array]:
         """The cost and its derivative by each pose, shape (k, size)."""
         scaled = self._scale(rows)
         slip = self._lengths(scaled)
         excess = np.maximum(slip - self._stiff_beyond, 0.0)
-        stretch = np.repeat(1 + _STIFFNESS * excess / np.maximum(slip, 1e-12), self._parts, axis=1)
+        by_part = 1 + _STIFFNESS * excess / np.maximum(slip, 1e-12)
+        by_part[self._is_heavy] = heavy_tailed_weight(slip[self._is_heavy] ** 2)
+        stretch = np.repeat(by_part, self._parts, axis=1)
         pull = scaled * stretch * self._weights
         later, earlier = self._space.slip_derivatives(rows, self._motions)
         gradient = np.zeros_like(rows)
         gradient[1:] += np.einsum("kij,ki->kj", later, pull)
         gradient[:-1] += np.einsum("kij,ki->kj", earlier, pull)
-        return float(np.sum(_costs(slip, excess))), gradient
+        return float(np.sum(self._costs(slip, excess))), gradient
 
     def information(self, rows: Array) -> Array:
-        """Second derivative by all poses but the first, slips taken as Gaussian; shape ((k - 1) size, (k - 1) size)."""
+        """Second derivative by all poses but the first, slips taken as Gaussian; shape ((k - 1) size, (k - 1) size).
+
+        A measured step tells as much less as it is farther off than it should be.
+        """
         count, size = len(rows) - 1, self._space.size
         later, earlier = self._space.slip_derivatives(rows, self._motions)
         by_rows = np.zeros((count, size, count, size))
         index = np.arange(count)
         by_rows[index, :, index] = later
         by_rows[index[1:], :, index[:-1]] = earlier[1:]
-        scaled = (by_rows * self._weights[:, :, None, None]).reshape(count * size, count * size)
+        scaled = (by_rows * self._trust(rows)[:, :, None, None]).reshape(count * size, count * size)
         return np.asarray(scaled.T @ scaled)
 
     def slips_in_sigma(self, rows: Array) -> Array:
         """Lengths of translation and rotation of each slip over their standard deviations, shape (k - 1, 2)."""
         return self._lengths(self._scale(rows))
+
+    def _trust(self, rows: Array) -> Array:
+        """One over the standard deviation of each component of each step, larger for measured ones that are off."""
+        if not self._is_heavy.any():
+            return self._weights
+        trust, slip = self._weights.copy(), self._lengths(self._scale(rows))[self._is_heavy]
+        trust[self._is_heavy] *= np.repeat(np.sqrt(heavy_tailed_weight(slip**2)), self._parts, axis=1)
+        return trust
+
+    def _costs(self, slip: Array, excess: Array) -> Array:
+        costs = 0.5 * np.sum(slip**2 + _STIFFNESS * excess**2, axis=1)
+        costs[self._is_heavy] = heavy_tailed_cost(slip[self._is_heavy] ** 2).sum(axis=1)
+        return np.asarray(costs)
 
     def scaled_slips(self, rows: Array) -> Array:
         """Each slip over its standard deviations, shape (k - 1, size)."""
@@ -113,10 +142,6 @@ class MotionCost:
         return np.sqrt(np.add.reduceat(scaled**2, [0, self._space.translations], axis=1))
 
 
-def _costs(slip: Array, excess: Array) -> Array:
-    return np.asarray(0.5 * np.sum(slip**2 + _STIFFNESS * excess**2, axis=1))
-
-
 def pushed_nats(noise: MotionNoise, space: PoseVectors) -> float:
     """The cost of a push of an object left in place, apart from its size.
 
@@ -131,9 +156,13 @@ def _push_scale(noise: MotionNoise) -> float:
 
 
 def estimated_noise(contact_map: ContactMap, configured: MotionNoise) -> MotionNoise:
-    """The motion noise estimated from the slips of a trajectory, with the configured one as prior."""
+    """The motion noise estimated from the slips of a trajectory, with the configured one as prior.
+
+    Steps that the fingertips measured have a noise of their own and say nothing about the others'.
+    """
     cost = MotionCost.of(contact_map, configured)
-    bound = [how is not Moved.FREELY for how in contact_map.moved[1:]]
+    known = zip(contact_map.moved[1:], contact_map.motion_sigmas[1:], strict=True)
+    bound = [how is not Moved.FREELY and measured is None for how, measured in known]
     slips = cost.slips_in_sigma(contact_map.rows)[bound]
     translations, size = contact_map.space.translations, contact_map.space.size
     freedom = np.array([translations, size - translations])

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.shape.fields.field_grid import Field
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
@@ -42,6 +42,7 @@ class ParticleTracker:
         self._kernel_every, self._field_of = kernel_every, field_of
         self._belief = Belief.certain(first.placed[-1].row, particles)
         self._motion = np.zeros(3)
+        self._motion_sigma: StepSigma | None = None
         self.effective_count = float(particles)
 
     @property
@@ -52,9 +53,10 @@ class ParticleTracker:
     def refined(self) -> ContactMap:
         return self._map
 
-    def predict(self, motion: Array) -> None:
-        self._motion = motion
-        self._belief = self._belief.predict(motion, self._noise, self._rng)
+    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
+        self._motion, self._motion_sigma = motion, measured
+        noise = self._noise if measured is None else self._noise.after(motion, measured)
+        self._belief = self._belief.predict(motion, noise, self._rng)
 
     def weigh(self, contacts: ContactSet) -> bool:
         if len(contacts) == 0:
@@ -71,7 +73,7 @@ class ParticleTracker:
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         estimate = self.estimate()
-        grasp = PlacedGrasp(contacts, estimate.row, estimate.covariance, self._motion)
+        grasp = PlacedGrasp(contacts, estimate.row, estimate.covariance, self._motion, motion_sigma=self._motion_sigma)
         self._map = self._map.with_grasp(grasp if certain else grasp.put_aside())
         if certain and len(self._map.placed) % self._kernel_every == 0:
             self._map = self._map.with_best_kernel()

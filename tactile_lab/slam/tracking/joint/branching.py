@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.tracking.contacts.contact_map import PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
@@ -25,6 +25,7 @@ class Branching:
     Attributes:
         contacts: of the grasp, world frame.
         motion: of the hand before it, a pose vector.
+        motion_sigma: its own standard deviations, if it was felt.
         noise: of the motion model.
         scorer: scores the result.
         settings: of the search.
@@ -33,6 +34,7 @@ class Branching:
 
     contacts: ContactSet
     motion: Array
+    motion_sigma: StepSigma | None
     noise: MotionNoise
     scorer: HypothesisScorer
     settings: JointSettings
@@ -46,8 +48,9 @@ class Branching:
         """All contacts of the grasp left out: the motion model alone says where the object is."""
         last = hypothesis.map.placed[-1]
         row = self.space.compose(self.motion, last.row)
-        covariance = last.covariance + np.diag(self.space.sigmas(self.noise.after(self.motion)) ** 2)
-        grasp = PlacedGrasp(self.contacts, row, covariance, self.motion).put_aside()
+        noise = self.noise.after(self.motion, self.motion_sigma)
+        covariance = last.covariance + np.diag(self.space.sigmas(noise) ** 2)
+        grasp = PlacedGrasp(self.contacts, row, covariance, self.motion, motion_sigma=self.motion_sigma).put_aside()
         longer = hypothesis.map.with_grasp(grasp)
         return replace(hypothesis, map=longer, left_out=self.scorer.price(longer))
 
@@ -71,8 +74,9 @@ class Branching:
     def _propose(self, hypothesis: Hypothesis) -> list[Hypothesis]:
         """Continuations of a hypothesis, scored by single contacts only."""
         unplaced, placed = hypothesis.map.trailing_unplaced, hypothesis.map.placed
-        motions = np.array([self.motion, *(grasp.motion for grasp in placed[len(placed) - unplaced :])])
-        noise = self.noise.after(motions).accumulate(1 + unplaced)
+        before = placed[len(placed) - unplaced :]
+        motions = np.array([self.motion, *(grasp.motion for grasp in before)])
+        noise = self.noise.over(motions, [self.motion_sigma, *(grasp.motion_sigma for grasp in before)])
         predicted = self.space.compose(self.motion, hypothesis.map.placed[-1].row)
         fitted = hypothesis.map.fit()
         rows, fit = propose(predicted, self.contacts, fitted, noise, self.settings.proposals, self.space)
@@ -81,7 +85,8 @@ class Branching:
         found = zip(rows, np.linalg.inv(fit.information), fit.cost, intrusions, strict=True)
         proposed = []
         for row, covariance, misfit, intrusion in found:
-            longer = hypothesis.map.with_grasp(PlacedGrasp(self.contacts, row, covariance, self.motion))
+            grasp = PlacedGrasp(self.contacts, row, covariance, self.motion, motion_sigma=self.motion_sigma)
+            longer = hypothesis.map.with_grasp(grasp)
             proposed.append(
                 Hypothesis(longer, hypothesis.misfit + float(misfit), float(intrusion), hypothesis.left_out)
             )

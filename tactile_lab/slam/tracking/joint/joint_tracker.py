@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -84,6 +84,7 @@ class JointTracker:
         self._hypotheses = [self._scorer.score(self._without_free_space(first))]
         self._branches: list[Hypothesis] = []
         self._motion = np.zeros(self._space.size)
+        self._motion_sigma: StepSigma | None = None
         self._whole: tuple[ContactMap, ContactMap] | None = None
         self._refined: tuple[ContactMap, ContactMap] | None = None
         self._has_ended = False
@@ -140,13 +141,13 @@ class JointTracker:
         """Whether the session is so long that its early grasps are summarized."""
         return len(self.map.placed) > 2 * self._settings.window
 
-    def predict(self, motion: Array) -> None:
-        self._motion = motion
+    def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
+        self._motion, self._motion_sigma = motion, measured
 
     def weigh(self, contacts: ContactSet) -> bool:
         """Branch every hypothesis into the poses proposed for this grasp, smooth the most likely ones and rank them."""
         contacts = contacts if self.mechanisms.has("free space") else contacts.without_free_places()
-        given = self._motion, self._noise, self._scorer, self._settings, self._space
+        given = self._motion, self._motion_sigma, self._noise, self._scorer, self._settings, self._space
         step = Branching(contacts, *given)
         branches = likeliest(step.branches(self._hypotheses), self._settings.smoothed, self._settings.branch_gap)
         smoothed = [self._scorer.smooth(branch.map, self._settings.iterations) for branch in branches]
@@ -274,7 +275,7 @@ class JointTracker:
         settings = self._settings.model_copy(update={"hypotheses": spread[0], "smoothed": spread[1]})
         tracker = JointTracker(replace(self.map, placed=(last,)), self._noise, settings, self._kernel_every)
         for grasp, later in zip(placed[-2::-1], placed[:0:-1], strict=True):
-            tracker.predict(space.inverse(later.motion))
+            tracker.predict(space.inverse(later.motion), later.motion_sigma)
             tracker.weigh(grasp.contacts_world)
             tracker.update_shape(grasp.contacts_world, certain=True)
             tracker.resample()

@@ -20,7 +20,7 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, heavy_tailed_cost, heavy_tailed_weight
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 
 UNEXPLAINED_COST = 2.0
@@ -43,7 +43,7 @@ class ProposalSettings(StrictModel):
     """How poses are proposed.
 
     Attributes:
-        samples: quasi-random samples of the motion model, half of them with twice its standard deviation.
+        samples: quasi-random samples of the motion model, half of them with its wider standard deviation.
         steps: Gauss-Newton steps.
         kept: largest number of different proposals.
         distinct_m, distinct_rad: proposals closer than both count as equal.
@@ -107,8 +107,9 @@ def propose(
     Returns:
         Pose vectors of shape (m, size), and their fit.
     """
-    spread = quasi_normal(settings.samples, space.size) * space.sigmas(noise)
-    spread[settings.samples // 2 :] *= 2.0
+    spread = quasi_normal(settings.samples, space.size)
+    spread[: settings.samples // 2] *= space.sigmas(noise)
+    spread[settings.samples // 2 :] *= space.sigmas(noise.wide)
     spread[0] = 0.0
     match = GraspMatch(predicted, contacts, field, noise, settings, space)
     longest, damping = _limits(space)
@@ -140,6 +141,7 @@ class GraspMatch:
     ) -> None:
         self._predicted, self._contacts, self._field = predicted, contacts, field
         self._settings, self._space, self._sigmas = settings, space, space.sigmas(noise)
+        self._is_heavy_tailed = noise.is_heavy_tailed
 
     def variance(self, rows: Array) -> Array:
         """The field's variance at every contact for poses of shape (n, size), shape (n, m)."""
@@ -164,13 +166,15 @@ class GraspMatch:
         distance = values**2 / value_variance
         away = self._space.deviation(rows, self._predicted) / self._sigmas
         each = 0.5 * (distance + np.log(value_variance) + tilt + contacts.dimension * np.log(normal_variance))
-        cost = -np.logaddexp(-each, -self._settings.unexplained_cost).sum(axis=1) + 0.5 * np.sum(away**2, axis=1)
+        slip, pull = self._prior(away)
+        cost = -np.logaddexp(-each, -self._settings.unexplained_cost).sum(axis=1) + slip
         still, poses = np.zeros_like(points), rows[:, None]
         grip = 1 / (value_variance * (1 + distance / _ROBUST_SQUARED))
         twist = 1 / (normal_variance * (1 + tilt / _ROBUST_SQUARED))
         by_value = self._space.by_row(poses, points, normals, slopes, still)
-        information = np.einsum("nmi,nm,nmj->nij", by_value, grip, by_value) + np.diag(self._sigmas**-2)
-        gradient = np.einsum("nmi,nm->ni", by_value, grip * values) + away / self._sigmas
+        information = np.einsum("nmi,nm,nmj->nij", by_value, grip, by_value)
+        information += pull[..., None] * np.diag(self._sigmas**-2)
+        gradient = np.einsum("nmi,nm->ni", by_value, grip * values) + pull * (away / self._sigmas)
         for axis in range(contacts.dimension):
             unit = np.broadcast_to(np.eye(contacts.dimension)[axis], points.shape)
             by_normal = self._space.by_row(poses, points, normals, still, unit)[..., self._space.translations :]
@@ -178,6 +182,15 @@ class GraspMatch:
             information[:, turning, turning] += np.einsum("nmi,nm,nmj->nij", by_normal, twist, by_normal)
             gradient[:, turning] += np.einsum("nmi,nm->ni", by_normal, twist * tilts[..., axis])
         return Fit(cost, information, gradient)
+
+    def _prior(self, away: Array) -> tuple[Array, Array]:
+        """Cost of the slips, in sigma, shape (n, size); and how hard they pull, relative to a normal distribution."""
+        if not self._is_heavy_tailed:
+            return 0.5 * np.sum(away**2, axis=1), np.ones_like(away)
+        turns = self._space.translations
+        squared = np.add.reduceat(away**2, [0, turns], axis=1)
+        pull = np.repeat(heavy_tailed_weight(squared), [turns, self._space.size - turns], axis=1)
+        return heavy_tailed_cost(squared).sum(axis=1), pull
 
     def _place(self, rows: Array) -> tuple[Array, Array]:
         return self._space.to_object(rows[:, None], self._contacts.points_m, self._contacts.normals)

@@ -13,7 +13,7 @@ from gtsam import Pose3, Rot3
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.core.contacts import ApproachPath, Contact, Grasp
+from drivers.core.contacts import ApproachPath, Contact, Grasp, StepSigma
 from drivers.core.errors import ConfigurationError
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, read_contact_log, write_contact_log
 from tactile_lab.experiments.data.planar_data import simulate
@@ -54,6 +54,7 @@ def logs(draw):
             draw(poses),
             draw(poses),
             tuple(draw(st.lists(lines, max_size=5))),
+            draw(st.none() | st.builds(StepSigma, sigmas, sigmas)),
         )
         for index in range(count)
     )
@@ -62,7 +63,9 @@ def logs(draw):
         | st.builds(ObjectTruth, name=st.text(max_size=5), mesh=st.none() | st.just("a.ply"))
         | st.just(ObjectTruth(polygon_m=((0.0, 0.0), (0.1, 0.0), (0.1, 1 / 30))))
     )
-    motion = draw(st.none() | st.builds(MotionSigma, translation_m=sigmas, rotation_rad=sigmas))
+    motion = draw(
+        st.none() | st.builds(MotionSigma, translation_m=sigmas, rotation_rad=sigmas, unheld=st.floats(0.01, 1.0))
+    )
     return ContactLog(3, draw(sigmas), draw(sigmas), motion, grasps, truth, tuple(draw(poses) for _ in range(count)))
 
 
@@ -86,7 +89,7 @@ def content(grasp: Grasp):
     forces = [contact.force_N for contact in grasp.contacts]
     ways = [(x.finger, x.start_world_m.tolist(), x.end_world_m.tolist(), x.touched) for x in grasp.approach_paths]
     matrices = (grasp.world_T_palm.matrix().tolist(), grasp.hand_motion_world.matrix().tolist())
-    return grasp.index, grasp.stamp_ns, touches, forces, ways, matrices
+    return grasp.index, grasp.stamp_ns, touches, forces, ways, matrices, grasp.motion_sigma
 
 
 class InwardNormalsError(Exception):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gtsam import Pose2, Pose3
 
-from drivers.core.contacts import Grasp
+from drivers.core.contacts import Grasp, StepSigma
 from drivers.core.poses import spatial
+from tactile_lab.evaluation.felt_slips import FeltSlips
 from tactile_lab.evaluation.slips import LEAST_STEPS, Slips
 
 
@@ -81,3 +84,17 @@ def test_an_object_that_is_left_but_turns_is_not_said_to_lie_still() -> None:
     found = Slips.between(*session(carried + turning)).motion
     assert found is not None
     assert found.unheld == pytest.approx(0.4, abs=0.05)
+
+
+def test_what_was_felt_is_judged_by_what_it_said_of_its_own_error() -> None:
+    rng = np.random.default_rng(7)
+    grasps, poses = session([(Pose2(0.03, 0.0, 0.5), slip) for slip in drawn(rng, 400, 0.002, 0.04)])
+    felt = [replace(each, motion_sigma=StepSigma(0.001, 0.02)) for each in grasps]
+    found = FeltSlips.join([FeltSlips.between(felt, poses), FeltSlips.between(grasps, poses)])
+    assert len(found.missed) == 400  # those of the second session were not felt
+    assert found.scale == pytest.approx(1.8, abs=0.2)  # 2, but for what is beyond 3 of them
+    lengths, turns = found.share_within(2.0)
+    assert lengths == pytest.approx(0.68, abs=0.05)
+    assert turns == pytest.approx(0.68, abs=0.07)
+    assert "odometry_scale by 1." in found.in_words()
+    assert FeltSlips().scale is None

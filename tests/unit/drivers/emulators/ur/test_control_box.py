@@ -10,7 +10,7 @@ from gtsam import Pose3, Rot3
 
 from drivers.core.clock import VirtualClock
 from drivers.core.errors import CodecError
-from drivers.emulators.ur.control_box import ControlBox
+from drivers.emulators.ur.control_box import ControlBox, Series
 from drivers.emulators.ur.rtde_server import RtdeClient, package
 from drivers.positioner.ur.poses import tcp_of
 
@@ -147,3 +147,10 @@ def test_a_cb3_does_not_know_remote_control() -> None:
     box = ControlBox(Forearm(), VirtualClock(), Pose3(), 4.6, "cb3")
     assert "could not understand" in box.on_dashboard("is in remote control\n")
     assert box.on_dashboard("PolyscopeVersion\n").startswith("URSoftware 3.15")
+
+
+@pytest.mark.parametrize(("series", "asked_Hz", "sent_Hz"), [("cb3", 500.0, 125.0), ("e", 500.0, 500.0)])
+def test_a_box_sends_no_faster_than_its_series(series: Series, asked_Hz: float, sent_Hz: float) -> None:
+    client = RtdeClient(ControlBox(Forearm(), VirtualClock(), Pose3(), 4.6, series))
+    client.feed(package(ord("O"), struct.pack(">d", asked_Hz) + b"actual_TCP_pose") + package(ord("S"), b""))
+    assert client.rate_hz == sent_Hz

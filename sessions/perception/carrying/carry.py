@@ -1,0 +1,223 @@
+"""How an object was carried from one place to another, and how far that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from gtsam import Pose2
+
+from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
+from drivers.core.fingertip import ContinuousFingertip
+from drivers.shadow.protocol.palm_images import Side
+from sessions.perception.carrying.carry_record import CarrySamples
+from sessions.perception.carrying.friction_balance import Balance, Friction, compose_steps
+from sessions.perception.carrying.tip_steps import TipSteps, tip_steps
+
+_ITERATIONS, _ITERATIONS_OF_OTHERS = 12, 4
+_FOOT_SHARE = 0.6
+"""Radius at which the table's friction acts against a turn, as a share of the foot's: 2/3 for a disc that presses
+evenly, less where the middle carries more.
+"""
+_LEAST_FOOT_m, _LARGEST_FOOT_m = 0.01, 0.05
+_FAR_m, _FAR_rad = 0.004, float(np.deg2rad(5.0))
+"""A slip that a person should hear of: more than half of the rigs' usual ones."""
+_RESISTED_SHARES = (0.2, 0.6)
+"""Net force over the sum of normal forces: usual on a table, and where all fingertips slide the same way."""
+_RESISTS = 0.25
+_NO_HOLD_s = 0.05
+"""Contacts may be missed for a few samples."""
+
+
+@dataclass(frozen=True)
+class CarryNoise:
+    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decision 55).
+
+    Attributes:
+        least_m, least_rad: of any carry.
+        spread: share of the differences between the answers of other assumptions about friction.
+        slip_m, slip_rad: share of the slip itself.
+        lying_m, lying_rad: what release and the next closing do to the object.
+        unseen: share of the hand's motion while fewer than two fingertips held the object, one was not heard, or the
+            object resisted.
+    """
+
+    least_m: float = 0.0003
+    least_rad: float = float(np.deg2rad(0.06))
+    spread: float = 0.6
+    slip_m: float = 0.03
+    slip_rad: float = 0.015
+    lying_m: float = 0.00045
+    lying_rad: float = float(np.deg2rad(0.4))
+    unseen: float = 0.5
+
+
+@dataclass(frozen=True)
+class Carry:
+    """One carry.
+
+    Attributes:
+        motion: of the object on the table, world frame: new pose = motion * old pose.
+        sigma: its standard deviations at the next grasp.
+        slip_m, slip_rad: motion of the object's middle relative to the palm, and its turn.
+        loose_s: how long no fingertip touched the object.
+        single_s: how long only one did.
+        resisted_N: force with which the object resisted, beyond what a table's friction explains; 0 if it did not.
+        void: fingertips without valid readings for a while.
+    """
+
+    motion: Pose2
+    sigma: StepSigma
+    slip_m: float
+    slip_rad: float
+    loose_s: float
+    single_s: float
+    resisted_N: float
+    void: tuple[str, ...]
+
+    def in_words(self) -> str:
+        """What to tell a person who watches."""
+        slipped = f"slipped {1e3 * self.slip_m:.0f} mm, {np.degrees(self.slip_rad):.0f} degrees"
+        return "; ".join([slipped, *self.problems])
+
+    @property
+    def is_remarkable(self) -> bool:
+        """Whether it slipped far, or cannot be known well."""
+        return self.slip_m > _FAR_m or self.slip_rad > _FAR_rad or bool(self.problems)
+
+    @property
+    def problems(self) -> tuple[str, ...]:
+        """What makes this carry less certain, in words."""
+        found = [f"{', '.join(self.void)} without valid readings"] if self.void else []
+        if self.single_s > _NO_HOLD_s:
+            found.append(f"held by one fingertip for {self.single_s:.1f} s")
+        if self.loose_s > _NO_HOLD_s:
+            found.append(f"touched by no fingertip for {self.loose_s:.1f} s")
+        if self.resisted_N:
+            found.append(f"the object resisted with {self.resisted_N:.1f} N: is it jammed, or held by something?")
+        return tuple(found)
+
+
+class CarryOdometry:
+    """Estimates carries; knows from earlier grasps how large the object is.
+
+    Args:
+        fingertips: that tell their contacts while they move, by finger.
+        side: of the hand.
+        scale: factor of the stated standard deviations.
+    """
+
+    def __init__(self, fingertips: Mapping[str, ContinuousFingertip], side: Side, scale: float = 1.0) -> None:
+        self._fingertips, self._side, self._scale = fingertips, side, scale
+        self._spans_m: list[float] = []
+        self.noise = CarryNoise()
+
+    def on_grasp(self, contacts: Sequence[Contact]) -> None:
+        """Contacts of a grasp: they tell the size of the object's foot."""
+        if len(contacts) > 1:
+            places_m = np.array([contact.point_world_m[:2] for contact in contacts])
+            gaps = places_m[:, None] - places_m[None]
+            self._spans_m.append(float(np.linalg.norm(gaps, axis=-1).max()))
+
+    @property
+    def foot_m(self) -> float:
+        """Radius at which the table's friction acts against a turn."""
+        half_m = np.mean(self._spans_m) / 2 if self._spans_m else 0.05
+        return float(np.clip(_FOOT_SHARE * half_m, _LEAST_FOOT_m, _LARGEST_FOOT_m))
+
+    def estimate(self, samples: CarrySamples) -> Carry:
+        """The carry that these samples tell of."""
+        return self.carry(tip_steps(samples, self._fingertips, self._side))
+
+    def carry(self, steps: TipSteps) -> Carry:
+        """The carry that these steps make; deterministic."""
+        balance, usual = Balance.of(steps), Friction(foot_m=self.foot_m)
+        best = balance.solve([usual], _ITERATIONS)[0]
+        others = balance.solve(_other_assumptions(usual), _ITERATIONS_OF_OTHERS, best)
+        motions = compose_steps(np.concatenate([best[None], others]), balance.centres_m)
+        palm = _planar_motions(steps.world_T_palm[[0, -1]])[0]
+        middle = balance.centres_m[0]
+        ends = np.array([_displacement(motion, middle) for motion in motions])
+        slip = _displacement(np.linalg.inv(palm) @ motions[0], middle)
+        loose_s, single_s = (float(steps.step_s @ (steps.felt.sum(axis=1) == count)) for count in (0, 1))
+        void_s = steps.step_s @ (steps.is_void & [finger in self._fingertips for finger in FINGERS])
+        return Carry(
+            motion=_pose(motions[0]),
+            sigma=self._sigma(ends.std(axis=0), slip, _unseen(steps, balance.centres_m, self._fingertips)),
+            slip_m=float(np.hypot(*slip[:2])),
+            slip_rad=float(abs(slip[2])),
+            loose_s=loose_s,
+            single_s=single_s,
+            resisted_N=_resisted_N(steps),
+            void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
+        )
+
+    def _sigma(self, spread: Array, slip: Array, unseen: Array) -> StepSigma:
+        noise = self.noise
+        far_m, far_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2]
+        while_held_m = noise.least_m + noise.spread * far_m + noise.slip_m * np.hypot(*slip[:2])
+        while_held_rad = noise.least_rad + noise.spread * far_rad + noise.slip_rad * abs(slip[2])
+        parts_m = [while_held_m, noise.lying_m, noise.unseen * unseen[0]]
+        parts_rad = [while_held_rad, noise.lying_rad, noise.unseen * unseen[1]]
+        scaled = self._scale * np.linalg.norm(parts_m), self._scale * np.linalg.norm(parts_rad)
+        return StepSigma(float(scaled[0]), float(scaled[1]))
+
+
+def _other_assumptions(usual: Friction) -> Sequence[Friction]:
+    """Other frictions that cannot be excluded; what they change is what is not known."""
+    return (
+        replace(usual, tips=0.3),
+        replace(usual, tips=1.0),
+        replace(usual, foot_m=usual.foot_m / 1.5),
+        replace(usual, foot_m=1.5 * usual.foot_m),
+        replace(usual, table_N=0.0),
+        replace(usual, normal_weight=usual.normal_weight / 5),
+    )
+
+
+def _resistance(steps: TipSteps) -> Array:
+    """How little the fingertips can be believed to stick in each step, 0 to 1, shape (n,): by their net force."""
+    share = np.linalg.norm(steps.net_forces_N, axis=1) / np.maximum(steps.forces_N.sum(axis=1), 1e-9)
+    low, high = _RESISTED_SHARES
+    return np.asarray(np.clip((share - low) / (high - low), 0.0, 1.0) ** 2)
+
+
+def _resisted_N(steps: TipSteps) -> float:
+    """Mean net force while the object resisted; 0 if it hardly did."""
+    resists = _resistance(steps) > _RESISTS
+    if steps.step_s @ resists < _NO_HOLD_s:
+        return 0.0
+    return float(np.linalg.norm(steps.net_forces_N[resists], axis=1).mean())
+
+
+def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip]) -> Array:
+    """The hand's motion, metres and radians, in steps that too few fingertips tell of; shape (2,)."""
+    wired = [finger in fingertips for finger in FINGERS]
+    poorly = (steps.felt.sum(axis=1) < 2) | (steps.is_void & wired).any(axis=1)
+    doubt = np.maximum(poorly, _resistance(steps))
+    moves = _planar_motions(steps.world_T_palm)
+    shifts = np.einsum("nij,nj->ni", moves[:, :2, :2], centres_m) + moves[:, :2, 2] - centres_m
+    turns = np.abs(np.arctan2(moves[:, 1, 0], moves[:, 0, 0]))
+    return np.array([np.linalg.norm(shifts, axis=1) @ doubt, turns @ doubt])
+
+
+def _planar_motions(frames: Array) -> Array:
+    """Motions from each of n frames, shape (n, 4, 4), to the next, on the table: shape (n - 1, 3, 3)."""
+    moves = frames[1:] @ np.linalg.inv(frames[:-1])
+    turns = np.arctan2(moves[:, 1, 0] - moves[:, 0, 1], moves[:, 0, 0] + moves[:, 1, 1])
+    planar = np.tile(np.eye(3), (len(moves), 1, 1))
+    planar[:, 0, 0] = planar[:, 1, 1] = np.cos(turns)
+    planar[:, 1, 0], planar[:, 0, 1] = np.sin(turns), -np.sin(turns)
+    planar[:, :2, 2] = moves[:, :2, 3]
+    return planar
+
+
+def _displacement(motion: Array, middle_m: Array) -> Array:
+    """Displacement of a point by a planar motion, and the motion's angle, shape (3,)."""
+    moved = motion[:2, :2] @ middle_m + motion[:2, 2] - middle_m
+    return np.array([*moved, np.arctan2(motion[1, 0], motion[0, 0])])
+
+
+def _pose(motion: Array) -> Pose2:
+    return Pose2(float(motion[0, 2]), float(motion[1, 2]), float(np.arctan2(motion[1, 0], motion[0, 0])))

@@ -1,0 +1,165 @@
+"""The motion of least frictional power: how an object moves between fingertips that drag it over a table.
+
+A quasi-static object moves such that friction uses up as little power as possible (Peshkin and Sanderson 1989). For
+each step the unknown is the object's small motion on the table, y = (dx, dy, da) about a reference point. With s_i the
+motion of fingertip i's material relative to the object at the contact, n_i its normal and N_i its normal force, y
+minimises
+
+    sum_i w N_i (n_i . s_i)^2  +  sum_i mu N_i H(|s_i - (n_i . s_i) n_i|)  +  F H(sqrt(dx^2 + dy^2 + c^2 da^2))
+
+Fingertips neither enter nor leave the object; those inside their friction cones stick and the others slide where it
+costs least, without anybody deciding which; the table resists (an ellipsoidal limit surface, Howe and Cutkosky 1996).
+H is the absolute value, quadratic below a creep. It is convex; reweighted least squares solve all steps at once.
+Tangential forces are not used: normals, normal forces and the fingertips' motion suffice. Without a contact the
+object stays where it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from sessions.perception.carrying.tip_steps import TipSteps
+
+TIP_CREEP_m_s, TABLE_CREEP_m_s = 0.003, 0.005
+"""Slower sliding than this is the give of soft skin, or the joint angles' noise. A larger one of the fingertips lets a
+round object turn in a hand that holds it: its normals all go through the axis, and only sticking turns it.
+"""
+_LEAST_WEIGHT = np.diag([1e-3, 1e-3, 1e-6])
+"""Keeps a step determined in which nothing holds the object, not even the table."""
+
+
+@dataclass(frozen=True)
+class Friction:
+    """What the balance assumes.
+
+    Attributes:
+        tips: coefficient of friction at the fingertips.
+        table_N: force of friction of the table on the object: its weight times the coefficient.
+        foot_m: radius at which the table's friction acts against a turn, about 0.6 of the foot's radius.
+        normal_weight: w, 1/m; how hard the normals are.
+    """
+
+    tips: float = 0.6
+    table_N: float = 1.0
+    foot_m: float = 0.03
+    normal_weight: float = 2e5
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The linear and quadratic terms of n steps, from which every choice of friction is solved.
+
+    Attributes:
+        centres_m: reference points, shape (n, 2).
+        forces_N: normal forces, shape (n, 5).
+        sticking, sticking_gradient, sliding_squared: square of a tangential relative motion as y' A y - 2 b' y + c,
+            shapes (n, 5, 9), (n, 5, 3), (n, 5).
+        entering, entering_gradient: of the motions along the normals, summed, shapes (n, 3, 3) and (n, 3).
+        step_s: shape (n,).
+    """
+
+    centres_m: Array
+    forces_N: Array
+    sticking: Array
+    sticking_gradient: Array
+    sliding_squared: Array
+    entering: Array
+    entering_gradient: Array
+    step_s: Array
+
+    @classmethod
+    def of(cls, steps: TipSteps) -> Balance:
+        """Of the steps of a carry."""
+        forces_N, moves_m, normals = steps.forces_N, steps.moves_m, steps.normals
+        centres_m = _centres_m(steps)
+        arms = steps.points_m[..., :2] - centres_m[:, None]
+        jacobians = np.zeros((*forces_N.shape, 3, 3))
+        jacobians[..., 0, 0] = jacobians[..., 1, 1] = 1.0
+        jacobians[..., 0, 2], jacobians[..., 1, 2] = -arms[..., 1], arms[..., 0]
+        across = np.einsum("nfi,nfij->nfj", normals, jacobians)
+        along = np.einsum("nfi,nfi->nf", normals, moves_m)
+        sticking = np.einsum("nfki,nfkj->nfij", jacobians, jacobians) - across[..., :, None] * across[..., None, :]
+        gradient = np.einsum("nfki,nfk->nfi", jacobians, moves_m) - across * along[..., None]
+        squared = np.einsum("nfi,nfi->nf", moves_m, moves_m) - along**2
+        return cls(
+            centres_m=centres_m,
+            forces_N=forces_N,
+            sticking=sticking.reshape(*forces_N.shape, 9),
+            sticking_gradient=gradient,
+            sliding_squared=squared,
+            entering=np.einsum("nf,nfi,nfj->nij", forces_N, across, across),
+            entering_gradient=np.einsum("nf,nfi,nf->ni", forces_N, across, along),
+            step_s=steps.step_s,
+        )
+
+    def solve(self, choices: Sequence[Friction], iterations: int, start: Array | None = None) -> Array:
+        """The motions of least power for several assumptions, shape (choices, n, 3): m, m, rad.
+
+        Args:
+            choices: what is assumed.
+            iterations: of reweighted least squares.
+            start: motions to begin with, shape (n, 3); by default an object at rest.
+        """
+        tips, table_N, foot_m, hardness = (
+            np.array([getattr(choice, name) for choice in choices])[:, None]
+            for name in ("tips", "table_N", "foot_m", "normal_weight")
+        )
+        shape = (len(choices), *self.centres_m.shape[:1], 3)
+        motions = np.zeros(shape) if start is None else np.broadcast_to(start, shape)
+        extent = np.stack([np.ones_like(foot_m), np.ones_like(foot_m), foot_m], axis=-1)
+        fixed = hardness[..., None, None] * self.entering + _LEAST_WEIGHT
+        pull = hardness[..., None] * self.entering_gradient
+        creep_m, rest_m = TIP_CREEP_m_s * self.step_s[:, None], TABLE_CREEP_m_s * self.step_s
+        for _ in range(iterations):
+            grip = tips[..., None] * self.forces_N / np.maximum(self._sliding_m(motions), creep_m)
+            drag = table_N / np.maximum(np.linalg.norm(extent * motions, axis=-1), rest_m)
+            stiffness = fixed + (grip[..., None, :] @ self.sticking).reshape(*shape, 3)
+            stiffness += drag[..., None, None] * (extent**2)[..., None, :] * np.eye(3)
+            moment = pull + (grip[..., None, :] @ self.sticking_gradient)[..., 0, :]
+            motions = np.linalg.solve(stiffness, moment[..., None])[..., 0]
+        return np.asarray(motions)
+
+    def _sliding_m(self, motions: Array) -> Array:
+        """Tangential motion of each fingertip relative to the object, shape (choices, n, 5)."""
+        products = (motions[..., :, None] * motions[..., None, :]).reshape(*motions.shape[:-1], 9, 1)
+        squares = (self.sticking @ products)[..., 0] - 2 * (self.sticking_gradient @ motions[..., None])[..., 0]
+        return np.sqrt(np.maximum(squares + self.sliding_squared, 0.0))
+
+
+def _centres_m(steps: TipSteps) -> Array:
+    """Middle of the contacts of each step, shape (n, 2); where there are none, of all of them."""
+    felt = steps.felt.astype(float)
+    count = felt.sum(axis=1)
+    everywhere = np.einsum("nf,nfi->i", felt, steps.points_m[..., :2]) / max(float(felt.sum()), 1.0)
+    middles = np.einsum("nf,nfi->ni", felt, steps.points_m[..., :2]) / np.maximum(count, 1.0)[:, None]
+    return np.asarray(np.where(count[:, None] > 0, middles, everywhere))
+
+
+def compose_steps(motions: Array, centres_m: Array) -> Array:
+    """The motion of all steps together, in the world.
+
+    Args:
+        motions: (dx, dy, da) of the point of the object whose path has its middle in the centre; shape (..., n, 3).
+        centres_m: shape (n, 2).
+
+    Returns:
+        Homogeneous planar matrices, shape (..., 3, 3).
+    """
+    cosine, sine = np.cos(motions[..., 2]), np.sin(motions[..., 2])
+    before = centres_m - motions[..., :2] / 2
+    matrices = np.zeros((*motions.shape[:-1], 3, 3))
+    matrices[..., 0, 0] = matrices[..., 1, 1] = cosine
+    matrices[..., 0, 1], matrices[..., 1, 0], matrices[..., 2, 2] = -sine, sine, 1.0
+    matrices[..., :2, 2] = before + motions[..., :2]
+    matrices[..., 0, 2] -= cosine * before[..., 0] - sine * before[..., 1]
+    matrices[..., 1, 2] -= sine * before[..., 0] + cosine * before[..., 1]
+    while matrices.shape[-3] > 1:  # pairs, pairs of pairs, ...: a few array products instead of one for each step
+        if matrices.shape[-3] % 2:
+            rest = np.broadcast_to(np.eye(3), (*matrices.shape[:-3], 1, 3, 3))
+            matrices = np.concatenate([matrices, rest], axis=-3)
+        matrices = matrices[..., 1::2, :, :] @ matrices[..., 0::2, :, :]
+    return np.asarray(matrices[..., 0, :, :])

@@ -1,0 +1,68 @@
+"""Follows an object from the moment it is grasped until it is let go."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from drivers.core.contacts import Array
+from drivers.core.fingertip import ContinuousFingertip, FingertipSensor
+from drivers.shadow.protocol.palm_images import Side
+from sessions.perception.carrying.carry import Carry, CarryOdometry
+from sessions.perception.carrying.carry_record import CarryRecord
+from sessions.perception.touch_capture import Measured
+
+
+class HeldObject:
+    """Collects what hand and fingertips tell from a capture on, and estimates the carry when a hold ends.
+
+    The object begins to slip when the fingers squeeze it, which is before the hold: so the capture is the beginning.
+    It ends with the hold. While the fingers open, they leave one after the other, and light contacts mislead.
+
+    Args:
+        fingertips: of the rig, by finger; none for no odometry.
+        side: of the hand.
+        scale: factor of the stated standard deviations.
+    """
+
+    def __init__(self, fingertips: Mapping[str, FingertipSensor], side: Side, scale: float = 1.0) -> None:
+        continuous = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
+        self._record, self._odometry = CarryRecord(continuous), CarryOdometry(continuous, side, scale)
+        self._from_ns = 0
+        self.carry: Carry | None = None
+        """The last completed one; None if the fingertips told nothing."""
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether an object is grasped, and :meth:`on_hand` is wanted."""
+        return self._record.is_open
+
+    def on_hand(self, stamp_ns: int, joints_rad: Array, world_T_forearm: Array) -> None:
+        """Joint angles, shape (24,), and the forearm's pose, shape (4, 4)."""
+        self._record.take(stamp_ns, joints_rad, world_T_forearm)
+
+    def on_capture(self, stamp_ns: int) -> None:
+        """The fingers have closed and rest: whatever moves the object from now on counts."""
+        self._from_ns = stamp_ns
+        self._record.begin()
+
+    def on_grasp(self, measured: Measured) -> None:
+        """The capture's contacts; the object was where they say in the middle of the capture."""
+        self._from_ns = measured.stamp_ns
+        self._odometry.on_grasp(measured.contacts)
+
+    def on_hold(self, stamp_ns: int) -> None:
+        """The hand begins to carry the object."""
+        if not self._record.is_open:
+            self.on_capture(stamp_ns)
+
+    def on_left(self) -> None:
+        """The object is not held."""
+        self._record.end()
+
+    def end_hold(self, until_ns: int | None = None) -> Carry | None:
+        """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""
+        samples = self._record.since(self._from_ns)
+        self.carry = None if samples is None else self._odometry.estimate(samples)
+        if until_ns is None:
+            self._record.end()
+        return self.carry
