@@ -24,6 +24,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         planar.METHODS_2D,
         solids.METHODS_3D,
         solids.EVERYDAY,
+        solids.EVERYDAY_SHAPE,
         solids.KNOWN_SHAPE,
         solids.SOLID_LIMIT,
         solids.METHODS_6DOF,

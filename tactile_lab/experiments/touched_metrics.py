@@ -18,9 +18,10 @@ from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import rotate, transform_points
-from tactile_lab.slam.result import SlamResult
+from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.metrics.alignment import align_meshes
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh_with_normals
+from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 REACH_m = 0.015
 
@@ -48,6 +49,15 @@ class Touched(Protocol):
     def grasps(self) -> Sequence[Grasp]: ...
 
 
+class Estimated(Protocol):
+    """What was estimated: the surface, and the field with its contacts; None if there is none."""
+
+    @property
+    def mesh(self) -> SurfaceMesh | None: ...
+    @property
+    def surface(self) -> Gpis | None: ...
+
+
 @dataclass(frozen=True)
 class TouchedObject:
     """What was touched in a session; see :class:`Touched`."""
@@ -57,7 +67,7 @@ class TouchedObject:
     grasps: Sequence[Grasp]
 
 
-def touched_figures(data: Touched, result: SlamResult) -> dict[str, Any]:
+def touched_figures(data: Touched, result: Estimated) -> dict[str, Any]:
     """Figures of a run on the table: Hausdorff and mean distance after the best fit of the touched parts, the share of
     the estimate's touched part within two sigma, and the share of the true surface that was touched.
     """

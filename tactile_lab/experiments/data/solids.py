@@ -18,7 +18,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.simulation.mesh_object import load_truth_mesh
 from drivers.simulation.objects import CATALOGUE, object_model
-from tactile_lab.experiments.data.household import HOUSEHOLD, blend, capped_cylinder, surface_of
+from tactile_lab.experiments.data.household import HOUSEHOLD, blend, capped_cylinder, surface_of, turned
 from tactile_lab.experiments.data.ray_casting import first_hits
 from tactile_lab.slam.shape.surfaces.sampling import nearest_on_mesh
 
@@ -123,5 +123,40 @@ def _mug() -> trimesh.Trimesh:
     return surface_of(distance, (-0.042, -0.042, -0.052), (0.086, 0.043, 0.053))
 
 
-SOLIDS: Mapping[str, Callable[[], trimesh.Trimesh]] = {"ellipsoid": _ellipsoid, "mug": _mug, **HOUSEHOLD}
+def _ring() -> trimesh.Trimesh:
+    """Lying: 100 mm wide outside and 60 mm inside, 30 mm high, its edges rounded by 5 mm."""
+
+    def distance(x: Any, y: Any, z: Any) -> Any:
+        across = capped_cylinder(np.abs(np.hypot(x, y) - 0.040), z - 0.015, radius_m=0.005, half_length_m=0.010)
+        return across - 0.005
+
+    return surface_of(distance, (-0.053, -0.053, -0.003), (0.054, 0.054, 0.034))
+
+
+def _half_cylinder() -> trimesh.Trimesh:
+    """Lying on its flat face: radius 40 mm, length 100 mm along y."""
+    angles = np.linspace(0.0, np.pi, 49)
+    section = 0.040 * np.column_stack([np.cos(angles), np.sin(angles)])
+    corners = [(x, y, z) for y in (-0.050, 0.050) for x, z in section]
+    mesh: trimesh.Trimesh = trimesh.convex.convex_hull(np.array(corners))
+    return mesh
+
+
+def _can() -> trimesh.Trimesh:
+    """Standing: 66 mm wide and 115 mm high, narrower at the foot and at the lid, which is set in by 4 mm."""
+    radii = [0, 22, 25, 33, 33, 27, 27, 25, 25, 0]
+    return turned(radii, [4, 4, 0, 8, 105, 114, 115, 115, 111, 111])
+
+
+FURTHER_SHAPES = ("ring", "half-cylinder", "can")
+"""Own solids only for the experiment on the choice of a shape, and no part of its development."""
+
+SOLIDS: Mapping[str, Callable[[], trimesh.Trimesh]] = {
+    "ellipsoid": _ellipsoid,
+    "mug": _mug,
+    "ring": _ring,
+    "half-cylinder": _half_cylinder,
+    "can": _can,
+    **HOUSEHOLD,
+}
 """Solids that are not in the rig's catalogue."""

@@ -76,6 +76,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "polygon": _shape("polygon"),
         "polyhedron": _shape("polyhedron"),
         "prism": _shape("prism"),
+        "turned": _shape("turned"),
         "standing field": _shape("standing field"),
         "strays": _shape("strays"),
         "pose uncertainty": _joint("pose uncertainty"),
@@ -84,7 +85,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 )
 """Settings that switch a mechanism off, by its name."""
 
-_IN_SPACE_ONLY = ("polyhedron", "prism", "standing field", "strays", "held-out contacts", "pose uncertainty")
+_IN_SPACE_ONLY = ("polyhedron", "prism", "turned", "standing field", "strays", "held-out contacts", "pose uncertainty")
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
 _LONG_TOO = (NOTHING, "fixed lag")

@@ -5,9 +5,10 @@ from __future__ import annotations
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.household import HOUSEHOLD
-from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
+from tactile_lab.experiments.data.solids import FURTHER_SHAPES, MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.runs import contact_limit, known_shape, solid_limit, tracking_runs
+from tactile_lab.experiments.studies import everyday_shape
 from tactile_lab.experiments.studies.columns import (
     AGAINST_KNOWN,
     FINISH,
@@ -54,6 +55,12 @@ def _everyday_things(grasps: int) -> list[Setting]:
     return grid(noise=[100], shape=shapes, method=("known-pose", "joint"), grasps=sorted({grasps, grasps * 3 // 2}))
 
 
+def _everyday_shapes(grasps: int) -> list[Setting]:
+    scans = () if _everyday_scans_left_out() else EVERYDAY_SCANS
+    left_out = (everyday_shape.NOTHING, "turned")
+    return grid(shape=(*HOUSEHOLD, *FURTHER_SHAPES, *scans), without=left_out, grasps=[grasps])
+
+
 def _known_on_table(grasps: int) -> list[Setting]:
     return grid(noise=[100], shape=_solids(), grasps=[grasps], particles=[known_shape.PARTICLES])
 
@@ -93,21 +100,43 @@ METHODS_3D = Experiment(
     left_out=scans_left_out,
 )
 
+_TOUCHED_COLUMNS = (
+    Column("Hausdorff where touched, mm", "touched_hausdorff_mm", 2, versus=True),
+    Column("mean distance there, mm", "touched_mean_mm", 2, kind="median"),
+    Column("within 2 sigma there", "touched_within_2_sigma", 0, kind="percent"),
+)
+
 EVERYDAY = Experiment(
     "everyday-3d",
     "Everyday things on a table, grasped at all heights: known poses against estimated ones, where they were touched.",
     _everyday_things,
     tracking_runs.track_everyday_thing,
     (
-        Column("Hausdorff where touched, mm", "touched_hausdorff_mm", 2, versus=True),
-        Column("mean distance there, mm", "touched_mean_mm", 2, kind="median"),
-        Column("within 2 sigma there", "touched_within_2_sigma", 0, kind="percent"),
+        *_TOUCHED_COLUMNS,
         Column("surface touched", "touched_share", 0, kind="percent"),
         REGISTRATION,
         STEP,
         FINISH,
     ),
     ranges("method", "Hausdorff distance where touched, mm", "touched_hausdorff_mm", lambda cell: str(cell["shape"])),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+    left_out=_everyday_scans_left_out,
+)
+
+EVERYDAY_SHAPE = Experiment(
+    "everyday-shape",
+    "Shapes of everyday things on a table from grasps at all heights and known poses, with and without solids of "
+    "revolution.",
+    _everyday_shapes,
+    everyday_shape.shape_at_known_poses,
+    (
+        *_TOUCHED_COLUMNS,
+        Column("Hausdorff, mm", "hausdorff_mm", 2, kind="median"),
+        Column("within 2 sigma", "within_2_sigma", 0, kind="percent"),
+        FINISH,
+    ),
+    ranges("without", "Hausdorff distance where touched, mm", "touched_hausdorff_mm", lambda cell: str(cell["shape"])),
     pooled=("shape",),
     grasps=SPATIAL_GRASPS,
     left_out=_everyday_scans_left_out,

@@ -217,7 +217,7 @@ class Gpis:
         """
         if self._gradient_count == 0:
             return 1.0
-        return inflation(self._factor, self._weights, *self.contacts_m.shape)
+        return inflation(self._factor, self._weights, len(self.observations.points_m), self.contacts_m.shape[1])
 
     def mean(self, points_m: Array) -> Array:
         """Posterior mean (2.13, 2.18) at points of shape (q, d); shape (q,), metres."""

@@ -19,6 +19,7 @@ ShapePart: TypeAlias = Literal[
     "polygon",
     "polyhedron",
     "prism",
+    "turned",
     "standing field",
     "strays",
     "contradictions",

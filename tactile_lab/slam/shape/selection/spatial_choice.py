@@ -1,5 +1,5 @@
-"""Chooses the model that describes a solid best, by the evidence of contacts: smooth field, flat faces, or vertical
-walls.
+"""Chooses the model that describes a solid best, by the evidence of contacts: smooth field, flat faces, vertical walls,
+or a profile that turns about an axis.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from tactile_lab.slam.shape.selection.held_out import foretells_better
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
+from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, mesh_arrays
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
@@ -26,6 +27,7 @@ _FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
 _NOISE_SIGMAS = 2.0
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
+_LARGEST_SHARE_OFF_TURNED = 0.01
 _KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
 """Cost of a contact that is centimetres off the surface: that of one outlier among twenty good contacts."""
@@ -63,7 +65,8 @@ def best_spatial_shape(
     if field.log_evidence is None:
         return field
     without = gpis.settings.without
-    gpis = gpis if "strays" in without else _without_strays(gpis)
+    everything = gpis
+    gpis, left_out_nats = (gpis, 0.0) if "strays" in without else _without_strays(gpis)
     if floor_m is not None and "standing field" not in without:
         field = _try_make(lambda: StandingField.fit(gpis, floor_m)) or field
     best, most = field, -np.inf if "field" in without else field.log_evidence or -np.inf
@@ -74,7 +77,23 @@ def best_spatial_shape(
         evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
         if evidence > most and _earned(fit, evidence, gpis, floor_m):
             best, most = shape, evidence
-    return best
+    if floor_m is None or "turned" in without:
+        return best
+    return _turned(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+
+
+def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Turned | None:
+    """The solid of revolution, if it has more evidence and hardly any contact is off its surface.
+
+    Its evidence is a marginal likelihood like the field's, so that no cross-validation is needed. A handle has only a
+    few contacts: the body may well be likelier without them, but then the handle would be missing.
+    """
+    shape = _try_make(lambda: Turned.fit(gpis, floor_m, free_points_m))
+    if not isinstance(shape, Turned):
+        return None
+    off = _LARGEST_SHARE_OFF_TURNED
+    evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if evidence > at_least else None
 
 
 def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> bool:
@@ -86,8 +105,9 @@ def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> boo
     return foretells_better(fit, gpis, _COARSE_m, floor_m)
 
 
-def _without_strays(gpis: Gpis) -> Gpis:
-    """The field without contacts that share a plane with no other, if it explains the rest sufficiently better.
+def _without_strays(gpis: Gpis) -> tuple[Gpis, float]:
+    """The field without contacts that share a plane with no other, if it explains the rest sufficiently better, and the
+    log density of those left out.
 
     Every contact left out costs :data:`_LEFT_OUT_nats`, so that good contacts on curved parts stay.
     """
@@ -95,14 +115,15 @@ def _without_strays(gpis: Gpis) -> Gpis:
     planes = divide(contacts)
     kept = planes.sizes[planes.labels] > 1
     if kept.all() or np.count_nonzero(~kept) > _LARGEST_SHARE_OFF * len(contacts):
-        return gpis
+        return gpis, 0.0
     seen = gpis.observations
     rest = gpis.contacts_m[kept], gpis.normals[kept]
     trimmed = Gpis.fit(*rest, seen.value_sigma_m[kept], seen.gradient_sigma[kept], gpis.settings)
     trimmed = trimmed.optimise(max_iterations=_KERNEL_STEPS)
     peaks = 0.5 * np.log(contacts.point_weights) + 1.5 * np.log(contacts.normal_weights) - 2 * np.log(2 * np.pi)
-    without = trimmed.log_marginal_likelihood() + float(np.sum(peaks[~kept] - _LEFT_OUT_nats))
-    return trimmed if without > gpis.log_marginal_likelihood() + _LEFT_OUT_nats else gpis
+    left_out = float(np.sum(peaks[~kept] - _LEFT_OUT_nats))
+    likelier = trimmed.log_marginal_likelihood() + left_out > gpis.log_marginal_likelihood() + _LEFT_OUT_nats
+    return (trimmed, left_out) if likelier else (gpis, 0.0)
 
 
 def _candidates(
@@ -125,9 +146,15 @@ def _try_make(maker: Callable[[], FittedShape]) -> FittedShape | None:
 
 
 def _checked_evidence(
-    shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None, *, at_least: float
+    shape: FittedShape,
+    gpis: Gpis,
+    free_points_m: Array | None,
+    floor_m: float | None,
+    *,
+    at_least: float,
+    largest_share_off: float = _LARGEST_SHARE_OFF,
 ) -> float:
-    """The evidence of a sharp solid, reduced for contacts that its planes explain but its surface excludes.
+    """The evidence of a solid, reduced for contacts that its planes explain but its surface excludes.
 
     Minus infinity if it has no surface, excludes many contacts, or fills free places. Its surface is computed only if
     the evidence can reach ``at_least``.
@@ -140,7 +167,7 @@ def _checked_evidence(
         return -np.inf
     away_m = distances_to_mesh(gpis.contacts_m, mesh)
     free = np.empty((0, 3)) if free_points_m is None or "contradictions" in gpis.settings.without else free_points_m
-    if np.mean(away_m > _ON_SURFACE_m) > _LARGEST_SHARE_OFF or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
+    if np.mean(away_m > _ON_SURFACE_m) > largest_share_off or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
         return -np.inf
     return shape.log_evidence - stray_cost(away_m, contacts_of(gpis).point_weights)
 

@@ -1,0 +1,92 @@
+"""What is known of places without contacts, as evidence for a field: a finger went through, and an object is one piece.
+
+A field is told only what it has wrong: of the places where a finger was, those that it takes for the object's inside,
+and, if it parts the object into pieces, the narrowest place between two of them. Each is a value of the field, a small
+distance outside or inside with an uncertainty of the same size. What is told changes the field elsewhere, so this is
+repeated. Kernel and evidence stay as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.shape.fields.field_grid import FieldGrid
+from tactile_lab.slam.shape.fields.gpis import Gpis
+
+_DEPTH_m = 0.002
+"""How far outside or inside a told place is, and how uncertain that is."""
+_ROUNDS, _AT_ONCE, _LEAST_INSIDE_m = 4, 40, 0.0005
+_MOST_JOINTS = 6
+_RISE_m, _HIGHEST_m = 0.0005, 0.008
+"""Pieces are joined at the lowest level at which they meet, up to this one."""
+_MARGIN_m = 0.010
+_LEAST_SHARE = 0.02
+"""A piece counts if this share of the contacts is next to it."""
+
+
+def outside_at(gpis: Gpis, free_m: Array) -> Gpis:
+    """The field with places that are free, shape (q, d), outside of the object; normals are observed."""
+    told, field = np.empty((0, free_m.shape[1])), gpis
+    for _ in range(_ROUNDS):
+        inside_m = -field.mean(free_m) if len(free_m) else np.empty(0)
+        worst = np.argsort(-inside_m)[:_AT_ONCE]
+        worst = worst[inside_m[worst] > _LEAST_INSIDE_m]
+        if len(worst) == 0:
+            break
+        told, free_m = np.vstack([told, free_m[worst]]), np.delete(free_m, worst, axis=0)
+        field = _tell(gpis, told, _DEPTH_m)
+    return field
+
+
+def in_one_piece(gpis: Gpis, resolution_m: float) -> Gpis:
+    """The field with its pieces joined where they are nearest, found on a grid; normals are observed."""
+    for _ in range(_MOST_JOINTS):
+        contacts_m = gpis.contacts_m
+        corners_m = contacts_m.min(axis=0) - _MARGIN_m, contacts_m.max(axis=0) + _MARGIN_m
+        grid = FieldGrid.tabulate(gpis, *corners_m, resolution_m)
+        place_m = _narrowest_gap(grid, contacts_m)
+        if place_m is None:
+            break
+        gpis = _tell(gpis, place_m[None], -_DEPTH_m)
+    return gpis
+
+
+def _tell(gpis: Gpis, places_m: Array, value_m: float) -> Gpis:
+    """The field with further observed values."""
+    seen, count = gpis.observations, len(places_m)
+    observations = replace(
+        seen,
+        points_m=np.vstack([seen.points_m, places_m]),
+        values_m=np.append(seen.values_m, np.full(count, value_m)),
+        value_sigma_m=np.append(seen.value_sigma_m, np.full(count, _DEPTH_m)),
+    )
+    return Gpis(gpis.contacts_m, gpis.normals, gpis.settings, observations, gpis.kernel, gpis.prior, gpis.noise_scale)
+
+
+def _narrowest_gap(grid: FieldGrid, contacts_m: Array) -> Array | None:
+    """Between the piece with most contacts and the one that it meets first when the level rises; None if there is one
+    piece, or if they do not meet.
+    """
+    labels, _ = ndimage.label(grid.values_m < 0)
+    inside = np.argwhere(labels)
+    if len(inside) == 0:
+        return None
+    _, nearest = cKDTree(inside).query((contacts_m - grid.lower_m) / grid.spacing_m)
+    votes = np.bincount(labels[tuple(inside[nearest].T)])
+    pieces = np.flatnonzero(votes >= max(2, _LEAST_SHARE * len(contacts_m)))
+    largest = votes.argmax()
+    for level_m in np.arange(_RISE_m, _HIGHEST_m, _RISE_m) if len(pieces) > 1 else ():
+        joined, _ = ndimage.label(grid.values_m < level_m)
+        home = joined[labels == largest][0]
+        met = [piece for piece in pieces if piece != largest and joined[labels == piece][0] == home]
+        if met:
+            away = np.maximum(*(ndimage.distance_transform_edt(labels != piece) for piece in (largest, met[0])))
+            away[joined != home] = np.inf
+            node = np.unravel_index(away.argmin(), away.shape)
+            return np.asarray(grid.lower_m + grid.spacing_m * np.array(node))
+    return None

@@ -1,0 +1,224 @@
+"""A solid of revolution: a profile that turns about a vertical axis, as that of a bottle, a cup, a bowl or a tin.
+
+Contacts at all angles belong to one profile, a smooth field over the distance from the axis and the height. It has ten
+times as many contacts as a field in space has nearby, enough for a wall of 4 mm or a rim. The axis is where the lines
+along the normals meet, improved by the evidence of the profile.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+from scipy.optimize import minimize
+
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
+from tactile_lab.slam.shape.solids.mesh import area_weighted_normals
+from tactile_lab.slam.shape.solids.planes import WeightedContacts
+from tactile_lab.slam.shape.solids.polyhedron import contacts_of
+from tactile_lab.slam.shape.solids.revolving import generatrix, revolve
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour
+
+_LEAST_WALL_CONTACTS = 12
+_LARGEST_GAP_rad = np.deg2rad(150.0)
+"""Contacts on the walls must surround the axis: a smaller part of a circle may also belong to another shape."""
+_SIDEWAYS = 0.5
+"""A contact tells about the axis if its unit normal's horizontal part is longer than this."""
+_ROUNDS, _OUTLYING_SIGMAS = 8, 4.0
+_LARGEST_MISFIT = 2.0
+"""Largest mean square, in variances, of what normals have across the planes through the axis; about one if it exists.
+A hexagonal prism has 9, and is not worth the search for its profile.
+"""
+_AXIS_RANGE_m = 0.1
+"""Prior range of the axis: about the size of objects that a hand explores."""
+_AXIS_STEP_m, _AXIS_TOLERANCE_m, _EVIDENCE_TOLERANCE, _AXIS_TRIES = 0.0005, 2e-5, 0.02, 40
+_KERNEL_STEPS = 20
+_SECTION_GRID_m = 0.001
+_SPACING = 1.5
+_FOOT_SHARE, _UPRIGHT_SINE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, np.sin(np.deg2rad(20.0)), 0.2, 0.006
+"""As for the standing field: how much of the height is mirrored at the table, and how far inward its walls move."""
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A solid of revolution; implements FittedShape. Made by :meth:`fit`.
+
+    Attributes:
+        axis_m: where the axis stands, shape (2,).
+        axis_sigma_m: its standard deviation along each direction.
+        half: the field of the profile, contacts at (distance from the axis, height).
+        free_m: places known to be outside, in the same coordinates, shape (k, 2).
+        floor_m: height of the table.
+        log_evidence: that of the profile and of normals in planes through the axis, minus the price of the axis.
+        name: "turned".
+    """
+
+    axis_m: Array
+    axis_sigma_m: float
+    half: Gpis
+    free_m: Array
+    floor_m: float
+    log_evidence: float
+    name: str = "turned"
+
+    @classmethod
+    def fit(cls, gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> Self:
+        """Fit axis and profile to the contacts of a field.
+
+        Args:
+            gpis: a field fitted in space.
+            floor_m: height of the table that the object stands on.
+            free_points_m: places that a finger went through, shape (k, 3), or None.
+
+        Raises:
+            ShapeError: the contacts are in the plane, do not surround an axis, or their normals do not meet it.
+        """
+        contacts = contacts_of(gpis)
+        start_m, sigma_m = _axis(contacts)
+        if _around(contacts, start_m)[0] > _LARGEST_MISFIT:
+            raise ShapeError("the contacts' normals do not meet one vertical axis")
+        axis_m = _likeliest_axis(gpis, contacts, start_m)
+        half = _half(gpis, contacts, axis_m).optimise(max_iterations=_KERNEL_STEPS)
+        price = 2 * np.log(_AXIS_RANGE_m / (np.sqrt(2 * np.pi) * sigma_m))
+        evidence = half.log_marginal_likelihood() + _around(contacts, axis_m)[1] - price
+        free_m = np.empty((0, 3)) if free_points_m is None else np.reshape(free_points_m, (-1, 3))
+        return cls(axis_m, sigma_m, half, _to_profile(free_m, axis_m), floor_m, float(evidence))
+
+    @cached_property
+    def profile(self) -> Gpis:
+        """The field of the whole section through the axis, with all that is known of places without contacts."""
+        section = _both_halves(self.half, self.floor_m)
+        return in_one_piece(outside_at(section, np.vstack([self.free_m, self.free_m * [-1, 1]])), _SECTION_GRID_m)
+
+    def contour(self, resolution_m: float = 0.001) -> Contour:
+        """Raises ShapeError: a solid has no outline."""
+        raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
+
+    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
+        """The surface, watertight, its vertices about ``1.5 resolution_m`` apart; it always ends at the table.
+
+        Raises:
+            ShapeError: the profile encloses nothing.
+        """
+        section = extract_contour(self.profile, resolution_m=_SECTION_GRID_m)
+        step_m = _SPACING * resolution_m
+        line_m, sigma_m = generatrix(section, self.floor_m if floor_m is None else floor_m, step_m)
+        turned, rings = revolve(line_m, step_m)
+        normals = area_weighted_normals(turned)
+        sigma_m = np.hypot(sigma_m[rings], self.axis_sigma_m * np.linalg.norm(normals[:, :2], axis=1))
+        vertices_m = turned.vertices_m + np.append(self.axis_m, 0.0)
+        return SurfaceMesh(vertices_m, turned.triangles, sigma_m, normals, is_closed=section.is_closed)
+
+
+def _axis(contacts: WeightedContacts) -> tuple[Array, float]:
+    """The point next to the walls' normals, seen from above, and its standard deviation, by robust least squares.
+
+    Raises:
+        ShapeError: the contacts do not surround it.
+    """
+    walls = np.flatnonzero(np.linalg.norm(contacts.normals[:, :2], axis=1) > _SIDEWAYS)
+    if len(walls) < _LEAST_WALL_CONTACTS:
+        raise ShapeError(f"{len(walls)} contacts on walls are too few for an axis")
+    points_m, normals = contacts.points_m[walls, :2], contacts.normals[walls, :2]
+    across = np.column_stack([-normals[:, 1], normals[:, 0]])
+    offsets_m, weights = np.sum(across * points_m, axis=1), np.ones(len(walls))
+    for _ in range(_ROUNDS):
+        axis_m = np.linalg.lstsq(np.sqrt(weights)[:, None] * across, np.sqrt(weights) * offsets_m, rcond=None)[0]
+        reach_m = np.linalg.norm(points_m - axis_m, axis=1)
+        variance = 1 / contacts.point_weights[walls] + reach_m**2 / contacts.normal_weights[walls]
+        misses = (offsets_m - across @ axis_m) ** 2 / variance
+        weights = np.maximum(1 - misses / _OUTLYING_SIGMAS**2, 0.0) ** 2 / variance
+    if _largest_gap_rad((points_m - axis_m)[weights > 0]) > _LARGEST_GAP_rad:
+        raise ShapeError("the contacts do not surround an axis")
+    information = (weights[:, None] * across).T @ across
+    return axis_m, float(np.sqrt(np.diag(np.linalg.inv(information)).max()))
+
+
+def _largest_gap_rad(arms_m: Array) -> float:
+    """Largest angle between neighbouring directions of vectors, shape (n, 2)."""
+    if len(arms_m) < _LEAST_WALL_CONTACTS:
+        return 2 * np.pi
+    angles = np.sort(np.arctan2(arms_m[:, 1], arms_m[:, 0]))
+    return float(np.diff(angles, append=angles[0] + 2 * np.pi).max())
+
+
+def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> Array:
+    """The axis of largest evidence, with the kernel that is best for the first guess."""
+    kernel = _half(gpis, contacts, start_m).optimise(max_iterations=_KERNEL_STEPS).kernel.log_parameters
+
+    def cost(axis_m: Array) -> float:
+        half = _half(gpis, contacts, axis_m).with_log_parameters(kernel)
+        return -half.log_marginal_likelihood() - _around(contacts, axis_m)[1]
+
+    simplex = start_m + _AXIS_STEP_m * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    found = minimize(
+        cost,
+        start_m,
+        method="Nelder-Mead",
+        options={
+            "initial_simplex": simplex,
+            "xatol": _AXIS_TOLERANCE_m,
+            "fatol": _EVIDENCE_TOLERANCE,
+            "maxfev": _AXIS_TRIES,
+        },
+    )
+    return np.asarray(found.x)
+
+
+def _to_profile(points_m: Array, axis_m: Array) -> Array:
+    """Places of shape (q, 3) as (distance from the axis, height), shape (q, 2)."""
+    return np.column_stack([np.linalg.norm(points_m[:, :2] - axis_m, axis=1), points_m[:, 2]])
+
+
+def _split(contacts: WeightedContacts, axis_m: Array) -> tuple[Array, Array]:
+    """The contacts' normals within the planes through the axis, shape (n, 2), and across these planes, shape (n,)."""
+    arms_m = contacts.points_m[:, :2] - axis_m
+    out = arms_m / np.maximum(np.linalg.norm(arms_m, axis=1, keepdims=True), 1e-9)
+    level = contacts.normals[:, :2]
+    within = np.column_stack([np.sum(level * out, axis=1), contacts.normals[:, 2]])
+    return within, level[:, 1] * out[:, 0] - level[:, 0] * out[:, 1]
+
+
+def _half(gpis: Gpis, contacts: WeightedContacts, axis_m: Array) -> Gpis:
+    """The field of the profile from the contacts, all at positive distances."""
+    normals, _ = _split(contacts, axis_m)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+    sigmas = contacts.point_weights**-0.5, contacts.normal_weights**-0.5
+    return Gpis.fit(_to_profile(contacts.points_m, axis_m), normals, *sigmas, gpis.settings)
+
+
+def _around(contacts: WeightedContacts, axis_m: Array) -> tuple[float, float]:
+    """Mean square, in variances, and log density of what the normals have across the planes through the axis.
+
+    An error of the point along the circle turns the plane that the normal is compared with.
+    """
+    within, across = _split(contacts, axis_m)
+    reach_m = np.linalg.norm(contacts.points_m[:, :2] - axis_m, axis=1)
+    turn = within[:, 0] / np.maximum(reach_m, contacts.point_weights**-0.5)
+    variance = 1 / contacts.normal_weights + turn**2 / contacts.point_weights
+    squares = across**2 / variance
+    return float(squares.mean()), float(-0.5 * np.sum(squares + np.log(2 * np.pi * variance)))
+
+
+def _both_halves(half: Gpis, floor_m: float) -> Gpis:
+    """The field of the section on both sides of the axis, its foot continued below the table.
+
+    Walls near the table are mirrored at it, slightly inward, as those of the standing field; so is what faces up, as
+    the inside of a cup's bottom, which would have no thickness otherwise.
+    """
+    points_m, normals, seen = half.contacts_m, half.normals, half.observations
+    above_m = points_m[:, 1] - floor_m
+    feet = np.flatnonzero((normals[:, 1] > -_UPRIGHT_SINE) & (above_m < _FOOT_SHARE * above_m.max()))
+    inset_m = np.minimum(_INSET_SLOPE * np.abs(above_m[feet]), _LARGEST_INSET_m) * (normals[feet, 1] < _UPRIGHT_SINE)
+    below_m = (points_m[feet] - inset_m[:, None] * normals[feet]) * [1, -1] + [0, 2 * floor_m]
+    right_m, right = np.vstack([points_m, below_m]), np.vstack([normals, normals[feet] * [1, -1]])
+    source = np.concatenate([np.arange(len(points_m)), feet])
+    point_sigma_m, normal_sigma = (np.tile(sigma[source], 2) for sigma in (seen.value_sigma_m, seen.gradient_sigma))
+    both_m, both = np.vstack([right_m, right_m * [-1, 1]]), np.vstack([right, right * [-1, 1]])
+    section = Gpis.fit(both_m, both, point_sigma_m, normal_sigma, half.settings)
+    return section.with_log_parameters(half.kernel.log_parameters)
