@@ -11,7 +11,10 @@ _PLOTS = ("plots", "plot_data", "plot_sheet")
 _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
 _WITHOUT = ("cli", "workflow", "view", "report", "experiments/results", *(f"experiments/{name}.py" for name in _PLOTS))
 """Parts of tactile_lab that only present results or read commands, except for these modules:"""
-_WITH = tuple(f"workflow/{name}.py" for name in ("attending", "calibrating_forearm", "finishing", "running"))
+_WORKFLOW = (
+    "attending", "calibrating_forearm", "exporters", "exporting", "finishing", "plugging", "replaying", "running"
+)  # fmt: skip
+_WITH = tuple(f"workflow/{name}.py" for name in _WORKFLOW)
 
 
 @cache
