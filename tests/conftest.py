@@ -58,12 +58,18 @@ def lab_data() -> Path:
     return folder
 
 
+_ENDING_s = 2.0
+
+
 @pytest.fixture(autouse=True)
 def no_leaked_threads() -> Iterator[None]:
     """A test that leaves a thread behind fails."""
     before = set(threading.enumerate())
     yield
-    left = [thread.name for thread in threading.enumerate() if thread not in before and thread.is_alive()]
+    new = [thread for thread in threading.enumerate() if thread not in before]
+    for thread in new:
+        thread.join(_ENDING_s)  # it may be ending just now
+    left = [thread.name for thread in new if thread.is_alive()]
     assert not left, f"threads left running: {left}"
 
 

@@ -41,7 +41,7 @@ def test_a_wizard_is_led_from_its_page(program: WarmProgram, tmp_path: Path) -> 
         until(lambda: browser.shows("done; not enough yet: touches"), "what is missing in words")
         until(lambda: browser.shows("2/5 "), "the second step")
         assert browser.shows("weight of the weakest direction")
-        browser.press("Undo the last")
+        browser.press("Undo the last step")
         until(lambda: not browser.shows("2/5 "), "the first step again")
         browser.press("Quit")
         assert "Nothing was stored" in terminal.ended(130)
