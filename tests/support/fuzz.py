@@ -68,7 +68,7 @@ _ARM = ArmState(1.0, 7, 2, 1, 1.0, (0.0, 0.0, -3.0), ArmFlags.HEARD | ArmFlags.P
 class _EmptyBox:
     """A control box with nothing to tell."""
 
-    version = (5, 12, 0, 0)
+    version, highest_Hz = (5, 12, 0, 0), 500.0
 
     def output(self, name: str) -> float:
         return 0.0
