@@ -74,7 +74,10 @@ class Recorder:
         self._next_state_ns: int | None = None
 
     def add_onlooker(self, onlooker: TrafficSink) -> None:
-        """From now on viewers' topics also go to ``onlooker``; its ``write`` must be quick and never raise."""
+        """From now on viewers' topics, and what devices send, also go to ``onlooker``.
+
+        Its ``write`` must be quick, for what it does not show as well, and never raise.
+        """
         self._onlookers.append(onlooker)
 
     # --- what a replay needs -----------------------------------------------------------------------------------
@@ -85,7 +88,9 @@ class Recorder:
 
     def on_received(self, transport: str, payload: bytes, stamp_ns: int) -> None:
         """The device sent ``payload``, which arrived at ``stamp_ns``."""
-        self._put(schemas.received_topic(transport), payload, stamp_ns)
+        topic = schemas.received_topic(transport)
+        self._put(topic, payload, stamp_ns)
+        self._tell(topic, payload, stamp_ns)
 
     def event(self, event: SessionEvent) -> None:
         """Record a session event."""
@@ -213,6 +218,9 @@ class Recorder:
     def _put_json(self, topic: str, content: foxglove.Json, stamp_ns: int) -> None:
         data = schemas.encode(content)
         self._put(topic, data, stamp_ns)
+        self._tell(topic, data, stamp_ns)
+
+    def _tell(self, topic: str, data: bytes, stamp_ns: int) -> None:
         for onlooker in self._onlookers:
             onlooker.write(topic, data, stamp_ns)
 

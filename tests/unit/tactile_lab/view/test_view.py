@@ -38,7 +38,7 @@ from tactile_lab.view.feed import ViewFeed
 from tactile_lab.view.gate import Gate, Head, is_loopback, new_token, parse_head
 from tactile_lab.view.inner_door import InnerDoor
 from tactile_lab.view.page import Page
-from tactile_lab.view.scene import Scene, ellipse
+from tactile_lab.view.scene import CAMERA_PACKETS, Scene, ellipse
 from tactile_lab.view.skeleton import bones
 from tests.support.repository import REPOSITORY
 
@@ -381,6 +381,27 @@ def test_recording_is_whole_when_its_page_is_killed_or_hangs(tmp_path: Path, way
     traffic = session.traffic()
     assert sum(message.topic == schemas.LOG_TOPIC for message in traffic.messages()) == 3 * QUEUE_LENGTH
     assert not traffic.loss
+
+
+def test_what_devices_send_reaches_the_page_of_a_running_session(tmp_path: Path) -> None:
+    """The camera's picture comes from there; the page takes no other device's bytes."""
+
+    class Onlooker:
+        def __init__(self) -> None:
+            self.heard: list[tuple[str, bytes]] = []
+
+        def write(self, topic: str, data: bytes, stamp_ns: int) -> None:
+            self.heard.append((topic, data))
+
+    page = Onlooker()
+    with create_session(tmp_path, rig="sim", rig_description={}, object_name="box") as session:
+        session.recorder.add_onlooker(page)
+        session.recorder.on_received("camera", b"picture", 1)
+        session.recorder.on_transmitted("hand", b"command", 2)
+    assert page.heard == [(CAMERA_PACKETS, b"picture")]
+    feed = ViewFeed("127.0.0.1", 0, "", "test")
+    assert feed.is_shown(CAMERA_PACKETS, b"picture")
+    assert not feed.is_shown(schemas.received_topic("hand"), b"status")
 
 
 def test_page_says_what_is_pressed_and_nothing_that_it_must_not() -> None:
