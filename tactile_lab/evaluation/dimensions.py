@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, true_outline
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.tables import read_contour
-
-_JAW_m = 0.0005
-"""Points this close to the outermost one touch a caliper's jaw too; their standard deviations are averaged."""
+from tactile_lab.slam.doubt.sizes import SIDES, sizes
 
 
 @dataclass(frozen=True)
@@ -42,11 +38,10 @@ def dimensions(estimate: EstimateWithTruth) -> tuple[Extent, ...] | None:
         return None
     points_m, sigma_m = found
     truth_m = _true_points(estimate)
-    true_mm = [None] * points_m.shape[1] if truth_m is None else [1e3 * size for size, _ in _sizes(truth_m)]
-    names = ("length", "width", "height")
+    true_mm = [None] * points_m.shape[1] if truth_m is None else [1e3 * size for size, _ in sizes(truth_m)]
     return tuple(
         Extent(name, 1e3 * size, 1e3 * sigma, true)
-        for name, (size, sigma), true in zip(names, _sizes(points_m, sigma_m), true_mm, strict=False)
+        for name, (size, sigma), true in zip(SIDES, sizes(points_m, sigma_m), true_mm, strict=False)
     )
 
 
@@ -69,32 +64,3 @@ def _true_points(estimate: EstimateWithTruth) -> Array | None:
     if estimate.results.dimension == 2:
         return true_outline(estimate.results, estimate.truth)
     return None if estimate.truth.mesh is None else np.asarray(estimate.truth.mesh.vertices, dtype=float)
-
-
-def _sizes(points_m: Array, sigma_m: Array | None = None) -> Sequence[tuple[float, float]]:
-    """Length, width and, of points in space, height, each with its standard deviation, metres."""
-    sigma_m = np.zeros(len(points_m)) if sigma_m is None else sigma_m
-    along, across = _rectangle(points_m[:, :2])
-    places = [points_m[:, :2] @ along, points_m[:, :2] @ across, *points_m[:, 2:].T]
-    return [_size(place, sigma_m) for place in places]
-
-
-def _rectangle(points_m: Array) -> tuple[Array, Array]:
-    """Directions of the longer and the shorter side of the smallest rectangle around points of shape (n, 2).
-
-    One of its sides lies along a side of their convex hull.
-    """
-    hull = points_m[ConvexHull(points_m).vertices]
-    sides = np.roll(hull, -1, axis=0) - hull
-    along = sides / np.linalg.norm(sides, axis=1, keepdims=True)
-    across = np.column_stack([-along[:, 1], along[:, 0]])
-    spans = np.ptp(hull @ along.T, axis=0), np.ptp(hull @ across.T, axis=0)
-    best = int(np.argmin(spans[0] * spans[1]))
-    longer_first = spans[0][best] >= spans[1][best]
-    return (along[best], across[best]) if longer_first else (across[best], along[best])
-
-
-def _size(places_m: Array, sigma_m: Array) -> tuple[float, float]:
-    low, high = float(places_m.min()), float(places_m.max())
-    jaws = places_m <= low + _JAW_m, places_m >= high - _JAW_m
-    return high - low, float(np.hypot(*(sigma_m[jaw].mean() for jaw in jaws)))

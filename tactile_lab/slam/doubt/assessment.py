@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from tactile_lab.slam.doubt.known_part import known_part, with_guesses_told
 from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, turned_by_symmetry
 from tactile_lab.slam.doubt.signs import signs
+from tactile_lab.slam.doubt.sizes import unknown_sizes
 from tactile_lab.slam.doubt.status import (
     LARGEST_REFUSED_SHARE,
     LEAST_GRASPS,
@@ -79,6 +80,7 @@ def assess(
         *doubts_of(others),
         *_refused(refused),
         *_few(len(refused) - sum(refused)),
+        *unknown_sizes(shape),
         *(
             [Doubt("symmetry", symmetry.words, grave=False)]
             if symmetry is not None and symmetry.interchangeable

@@ -24,11 +24,12 @@ DoubtName: TypeAlias = Literal[
     "first-grasp",
     "refused-grasps",
     "few-grasps",
+    "unknown-size",
     "rivals",
     "symmetry",
 ]
 
-_PARTIAL: tuple[DoubtName, ...] = ("refused-grasps", "few-grasps")
+_PARTIAL: tuple[DoubtName, ...] = ("refused-grasps", "few-grasps", "unknown-size")
 """Doubts with which an estimate is not complete."""
 
 LEAST_KNOWN_SHARE = 0.8

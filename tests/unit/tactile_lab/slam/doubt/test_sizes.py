@@ -1,0 +1,34 @@
+"""The outer size of a shape, and a shape of which an end is a guess."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_lab.slam.doubt.sizes import sizes, unknown_sizes
+from tactile_lab.slam.doubt.status import status_of
+from tactile_lab.slam.shape.surfaces.surface import Contour
+
+CORNERS = np.array([[0.0, 0.0], [0.10, 0.0], [0.10, 0.06], [0.0, 0.06]])
+TURN = np.array([[0.8, -0.6], [0.6, 0.8]])
+
+
+def outline(right_end_m: float) -> Contour:
+    """A box of 100 x 60 mm, turned; its right end is known to so much."""
+    return Contour(CORNERS @ TURN.T, np.array([0.0005, right_end_m, right_end_m, 0.0005]), is_closed=True)
+
+
+def test_sizes_are_those_of_the_smallest_rectangle_with_the_sigma_of_both_ends() -> None:
+    (length, length_sigma), (width, width_sigma) = sizes(outline(0.003).points_m, outline(0.003).sigma_m)
+    assert (length, width) == pytest.approx((0.10, 0.06))
+    assert length_sigma == pytest.approx(np.hypot(0.0005, 0.003))
+    assert width_sigma == pytest.approx(np.hypot(0.00175, 0.00175))
+
+
+def test_a_shape_whose_end_is_a_guess_is_partial_however_much_of_it_is_known() -> None:
+    assert unknown_sizes(outline(0.002)) == []
+    assert unknown_sizes(None) == []
+    (doubt,) = unknown_sizes(outline(0.040))
+    assert "length 100 ± 40 mm" in doubt.words
+    assert status_of(lost=False, known_share=0.97, doubts=[doubt]) == "partial"
+    assert status_of(lost=False, known_share=0.97, doubts=[]) == "complete"
