@@ -11,7 +11,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
-from tactile_lab.slam.tracking.contacts.motion import compose, deviation, planar_motion, pose_row
+from tactile_lab.slam.tracking.contacts.motion import compose, deviation, planar_motion, pose_vector
 
 _LEAST_STEPS = 10
 _FAR = 3.0
@@ -37,8 +37,8 @@ class FeltSlips:
         for (before, _), (after, grasp) in pairwise(zip(world_T_object, grasps, strict=True)):
             own = grasp.motion_sigma
             if before is not None and after is not None and own is not None:
-                expected = compose(planar_motion(grasp.hand_motion_world), pose_row(planar(before)))
-                missed.append(deviation(pose_row(planar(after)), expected))
+                expected = compose(planar_motion(grasp.hand_motion_world), pose_vector(planar(before)))
+                missed.append(deviation(pose_vector(planar(after)), expected))
                 sigmas.append([own.translation_m, own.rotation_rad])
         return cls(np.array(missed).reshape(-1, 3), np.array(sigmas).reshape(-1, 2))
 

@@ -17,7 +17,7 @@ from gtsam import Pose3
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
 from tactile_lab.evaluation.felt_slips import FeltSlips
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, deviation, planar_motion, pose_row
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, deviation, planar_motion, pose_vector
 from tactile_lab.slam.tracking.evidence.motion_cost import STIFF_BEYOND_SIGMA
 
 LEAST_STEPS = 10
@@ -53,8 +53,8 @@ class Slips:
         for (before, _), (after, grasp) in pairwise(zip(world_T_object, grasps, strict=True)):
             if before is not None and after is not None:
                 motion = planar_motion(grasp.hand_motion_world)
-                expected = compose(motion, pose_row(planar(before)))
-                found[bool(motion.any())].append(deviation(pose_row(planar(after)), expected))
+                expected = compose(motion, pose_vector(planar(before)))
+                found[bool(motion.any())].append(deviation(pose_vector(planar(after)), expected))
         return cls(np.array(found[True]).reshape(-1, 3), np.array(found[False]).reshape(-1, 3))
 
     @classmethod

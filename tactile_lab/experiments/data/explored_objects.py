@@ -17,7 +17,7 @@ from tactile_lab.experiments.data.sensing import SLIP_SIGMA_m, SLIP_SIGMA_rad
 from tactile_lab.slam.exploration.policy import Belief
 from tactile_lab.slam.exploration.prediction import sampled_displacements
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, pose_row, sample_motion
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, pose_vector, sample_motion
 
 _SAMPLED_SURFACES, _PARTICLES = 16, 500
 _SLIP = np.array([SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad])
@@ -167,7 +167,7 @@ class MovingObject:
         """Samples of the present estimate, plus the possible push of the next grasp."""
         values, vectors = np.linalg.eigh(covariance)
         spread = rng.normal(size=(_PARTICLES, 3)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-        return sample_motion(pose_row(self._world_T_frame) + spread, np.zeros(3), MotionNoise(), rng)
+        return sample_motion(pose_vector(self._world_T_frame) + spread, np.zeros(3), MotionNoise(), rng)
 
 
 def moved_alike(points_m: Array, source_m: Array, target_m: Array) -> Array:

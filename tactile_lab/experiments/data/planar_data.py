@@ -25,7 +25,7 @@ from tactile_lab.experiments.data.sensing import (
     measured_contact,
     planar_pose,
 )
-from tactile_lab.slam.tracking.contacts.motion import row_pose
+from tactile_lab.slam.tracking.contacts.motion import vector_pose
 
 _FAN_rad = np.deg2rad([-75.0, -25.0, 25.0, 75.0, 180.0])
 _AIM_m = np.array([[-0.006, -0.006], [0.0, -0.004], [0.0, 0.004], [-0.006, 0.006], [0.0, 0.0]])
@@ -127,7 +127,7 @@ def _reorient(
     shift = rng.normal(0.0, 0.005, 2)
     turn = Pose2(0, 0, float(np.deg2rad(rng.uniform(5.0, 25.0))))
     hand_motion = planar_pose(middle + shift).compose(turn).compose(planar_pose(-middle))
-    slip = row_pose(scale * np.array([SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad]) * rng.normal(size=3))
+    slip = vector_pose(scale * np.array([SLIP_SIGMA_m, SLIP_SIGMA_m, SLIP_SIGMA_rad]) * rng.normal(size=3))
     moved = hand_motion.compose(world_T_body).compose(body_T_frame).compose(slip).compose(body_T_frame.inverse())
     palm = planar_pose(middle + shift + rng.normal(0.0, 0.008, 2), rng.normal(0.0, np.deg2rad(5.0)))
     return hand_motion, moved, palm

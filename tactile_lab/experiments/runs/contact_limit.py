@@ -37,8 +37,8 @@ from tactile_lab.slam.tracking.contacts.motion import (
     deviation,
     inverse,
     planar_motion,
-    pose_row,
-    row_pose,
+    pose_vector,
+    vector_pose,
 )
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 
@@ -127,7 +127,7 @@ class SeenSession:
         """
         bodies = [planar(pose) for pose in data.world_T_body]
         body_T_frame = bodies[0].between(planar_pose(data.grasps[0].points_world_m.mean(axis=0)))
-        rows = np.array([pose_row(body.compose(body_T_frame)) for body in bodies])
+        rows = np.array([pose_vector(body.compose(body_T_frame)) for body in bodies])
         index = np.repeat(np.arange(len(rows)), [len(grasp.contacts) for grasp in data.grasps]).astype(np.int64)
         motions = np.array([planar_motion(grasp.hand_motion_world) for grasp in data.grasps[1:]]).reshape(-1, 3)
         slips = compose(inverse(compose(motions, rows[:-1])), rows[1:])
@@ -143,7 +143,7 @@ class SeenSession:
 
     def estimate(self, error: EstimateOffset) -> list[Pose3]:
         """``world_T_frame`` of an estimate with this error."""
-        return [spatial(row_pose(row)) for row in compose(self.world_T_frame, inverse(error.rows))]
+        return [spatial(vector_pose(row)) for row in compose(self.world_T_frame, inverse(error.rows))]
 
 
 @dataclass(frozen=True)

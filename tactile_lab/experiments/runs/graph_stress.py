@@ -22,7 +22,7 @@ from drivers.core.contacts import Array
 from drivers.core.poses import wrap_angle_rad
 from tactile_lab.slam.graph.least_squares import solve
 from tactile_lab.slam.graph.relative_poses import RelativePose, chain
-from tactile_lab.slam.tracking.contacts.motion import compose, inverse, pose_row, row_pose
+from tactile_lab.slam.tracking.contacts.motion import compose, inverse, pose_vector, vector_pose
 
 ODOMETRY_SIGMAS = np.array([0.010, 0.010, np.deg2rad(20.0)])
 LOOP_SIGMAS = np.array([0.001, 0.001, np.deg2rad(2.0)])
@@ -140,19 +140,19 @@ def _gtsam_problem(
 ) -> tuple[gtsam.NonlinearFactorGraph, gtsam.Values]:
     factors, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
     anchor = gtsam.noiseModel.Diagonal.Sigmas(np.full(3, 1e-6))
-    factors.add(gtsam.PriorFactorPose2(0, row_pose(np.zeros(3)), anchor))
+    factors.add(gtsam.PriorFactorPose2(0, vector_pose(np.zeros(3)), anchor))
     for index, row in enumerate(chain(graph.odometry, np.zeros(3))):
-        start.insert(index, row_pose(row))
+        start.insert(index, vector_pose(row))
     for edge in (*graph.odometry, *graph.loops):
         noise: gtsam.noiseModel.Base = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
         if cost is not None and edge.end != edge.start + 1:
             noise = gtsam.noiseModel.Robust.Create(cost, noise)
-        factors.add(gtsam.BetweenFactorPose2(edge.start, edge.end, row_pose(edge.row), noise))
+        factors.add(gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.row), noise))
     return factors, start
 
 
 def _rows(values: gtsam.Values, graph: StressGraph) -> Array:
-    return np.array([pose_row(values.atPose2(index)) for index in range(len(graph.rows))])
+    return np.array([pose_vector(values.atPose2(index)) for index in range(len(graph.rows))])
 
 
 def trajectory_errors(rows: Array, truth: Array) -> tuple[float, float]:

@@ -31,7 +31,7 @@ from tactile_lab.slam.tracking.contacts.motion import (
     compose,
     deviation,
     planar_motion,
-    pose_row,
+    pose_vector,
     row_pose_in_space,
 )
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
@@ -67,7 +67,7 @@ def follow_known_shape(cell: Cell) -> dict[str, Any]:
     rng = np.random.default_rng([cell.seed, 61933])
     noise = MotionNoise(translation_m=scale * SLIP_SIGMA_m, rotation_rad=scale * SLIP_SIGMA_rad)
     height_m = data.world_T_body[0].transformFrom(body_T_frame.translation())[2]
-    first = pose_row(planar(data.world_T_body[0] * body_T_frame))
+    first = pose_vector(planar(data.world_T_body[0] * body_T_frame))
     follower = _Follower(mesh, height_m, noise, cell["particles"], rng)
     rows = follower.trajectory(data.grasps, first)
     poses = [row_pose_in_space(row, height_m) * body_T_frame.inverse() for row in rows]

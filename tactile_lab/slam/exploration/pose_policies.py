@@ -23,7 +23,7 @@ from tactile_lab.slam.exploration.prediction import sampled_poses
 from tactile_lab.slam.exploration.surface_policies import expected_contacts
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet, planar_rotation
-from tactile_lab.slam.tracking.contacts.motion import pose_row
+from tactile_lab.slam.tracking.contacts.motion import pose_vector
 from tactile_lab.slam.tracking.filter.measurement import CalibratedMeasurement, CalibratedSettings, Known
 
 _SMALLEST = 1e-30
@@ -142,7 +142,7 @@ class PoseSwitchPolicy:
 
 def imagine(points_m: Array, belief: Belief, settings: PoseSwitchSettings) -> ContactSet:
     """Contacts in the world as the estimate expects them, at points of shape (m, d) in the object frame."""
-    row = pose_row(belief.world_T_object)
+    row = pose_vector(belief.world_T_object)
     turn = planar_rotation(float(row[2]))
     places, directions = points_m.copy(), outward(belief.field, points_m)
     places[:, :2] = points_m[:, :2] @ turn.T + row[:2]

@@ -21,7 +21,7 @@ from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays
 from tactile_lab.slam.exploration.first_hits import first_hits
 from tactile_lab.slam.exploration.policy import Belief, Surface
 from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.tracking.contacts.motion import compose, inverse, pose_row
+from tactile_lab.slam.tracking.contacts.motion import compose, inverse, pose_vector
 
 _MOST_VERTICES = 160
 _LARGEST_MOVE_m = 0.015
@@ -121,7 +121,7 @@ def sampled_poses(belief: Belief, count: int, rng: np.random.Generator) -> Array
         return np.asarray(belief.particles[np.minimum(places, len(belief.particles) - 1)])
     values, vectors = np.linalg.eigh(belief.pose_covariance)
     spread = rng.normal(size=(count, 3)) * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
-    return np.asarray(pose_row(belief.world_T_object) + spread)
+    return np.asarray(pose_vector(belief.world_T_object) + spread)
 
 
 def most_fingers(candidates: Sequence[Candidate]) -> int:
@@ -138,7 +138,7 @@ def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: Po
     fingers = worlds.finger_errors_m.shape[1]
     padded = [_pad(candidate.rays, fingers) for candidate in candidates]
     starts, ways, longest = (np.array(parts) for parts in zip(*padded, strict=True))
-    frames = np.array([pose_row(candidate.world_T_grasp) for candidate in candidates])
+    frames = np.array([pose_vector(candidate.world_T_grasp) for candidate in candidates])
     starts, ways, longest = *_in_worlds(frames, starts, ways, belief, worlds), longest.ravel()
     outward_m = candidates[0].rays.radius_m * worlds.surface.normals
     around_m = worlds.corners_m + outward_m
@@ -197,7 +197,7 @@ def nominal_world(belief: Belief, surface: Surface, fingers: int) -> PossibleWor
     return PossibleWorlds(
         surface,
         surface.points_m[None],
-        pose_row(belief.world_T_object)[None],
+        pose_vector(belief.world_T_object)[None],
         np.zeros((1, 3)),
         np.zeros((1, fingers, 2)),
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.graph.relative_poses import RelativePose, jacobians, residuals
-from tactile_lab.slam.tracking.contacts.motion import pose_row, row_pose
+from tactile_lab.slam.tracking.contacts.motion import pose_vector, vector_pose
 
 _ANCHOR_SIGMAS = np.full(3, 1e-6)
 
@@ -31,7 +31,7 @@ def solve(
     """
     graph, values = gtsam_problem(odometry, loops, start, robust_scale)
     found = gtsam.LevenbergMarquardtOptimizer(graph, values).optimize()
-    return np.array([pose_row(found.atPose2(index)) for index in range(len(start))])
+    return np.array([pose_vector(found.atPose2(index)) for index in range(len(start))])
 
 
 def gtsam_problem(
@@ -40,9 +40,9 @@ def gtsam_problem(
     """The graph and the values to start from; parameters as for :func:`solve`."""
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     anchor = gtsam.noiseModel.Diagonal.Sigmas(_ANCHOR_SIGMAS)
-    graph.add(gtsam.PriorFactorPose2(0, row_pose(rows[0]), anchor))
+    graph.add(gtsam.PriorFactorPose2(0, vector_pose(rows[0]), anchor))
     for index, row in enumerate(rows):
-        values.insert(index, row_pose(row))
+        values.insert(index, vector_pose(row))
     for edge in odometry:
         graph.add(_factor(edge, gtsam.noiseModel.Gaussian.Covariance(edge.covariance)))
     for edge in loops:
@@ -54,7 +54,7 @@ def gtsam_problem(
 
 
 def _factor(edge: RelativePose, noise: gtsam.noiseModel.Base) -> gtsam.BetweenFactorPose2:
-    return gtsam.BetweenFactorPose2(edge.start, edge.end, row_pose(edge.row), noise)
+    return gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.row), noise)
 
 
 def squared_distances(rows: Array, edges: Sequence[RelativePose]) -> Array:

@@ -28,7 +28,7 @@ from tactile_lab.slam.graph.relative_poses import RelativePose
 from tactile_lab.slam.graph.similarity import SharedContacts, SimilaritySettings, shared_contacts
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-from tactile_lab.slam.tracking.contacts.motion import inverse, pose_row, row_pose
+from tactile_lab.slam.tracking.contacts.motion import inverse, pose_vector, vector_pose
 
 _ANCHOR_SIGMAS = np.array([1e-6, 1e-6, 1e-6])
 
@@ -123,14 +123,14 @@ def _tested_loop(
     alignment = align(contacts.select(shared.later), contacts.select(shared.earlier), on_table=True)
     correction = planar(alignment.target_T_source)
     rows = contact_map.rows
-    estimated = row_pose(rows[earlier]).between(row_pose(rows[later]))
+    estimated = vector_pose(rows[earlier]).between(vector_pose(rows[later]))
     covariance = _believable(alignment.covariance, settings)
     spread = covariance + _path_covariance(contact_map, earlier, later, settings)
     # Seen from the object frame the later contacts move by the correction, so the later pose moves by its inverse.
     moved = gtsam.Pose2.Logmap(correction)
     test_value = float(moved @ np.linalg.solve(spread, moved))
     relative = estimated.compose(correction.inverse())
-    displacement = row_pose(rows[earlier]).compose(correction).compose(row_pose(rows[later]).inverse())
+    displacement = vector_pose(rows[earlier]).compose(correction).compose(vector_pose(rows[later]).inverse())
     verdict, reason = _judge(shared, alignment, test_value, settings)
     limit = _test_limit(settings)
     return Loop(
@@ -172,7 +172,7 @@ def _step_covariance(contact_map: ContactMap, index: int, settings: PoseGraphSet
     """The filter's covariance of a pose (3.23), turned from world axes into the object's."""
     grasp = contact_map.placed[index]
     turn = np.eye(3)
-    turn[:2, :2] = row_pose(grasp.row).rotation().matrix().T
+    turn[:2, :2] = vector_pose(grasp.row).rotation().matrix().T
     return _believable(turn @ grasp.covariance @ turn.T, settings)
 
 
@@ -185,7 +185,7 @@ def optimise_poses(contact_map: ContactMap, loops: list[Loop], settings: PoseGra
         settings: of the graph.
     """
     rows = contact_map.rows
-    nodes = [row_pose(row) for row in inverse(rows)]
+    nodes = [vector_pose(row) for row in inverse(rows)]
     graph, start = gtsam.NonlinearFactorGraph(), gtsam.Values()
     graph.add(gtsam.PriorFactorPose2(0, nodes[0], gtsam.noiseModel.Diagonal.Sigmas(_ANCHOR_SIGMAS)))
     for index, node in enumerate(nodes):
@@ -196,30 +196,30 @@ def optimise_poses(contact_map: ContactMap, loops: list[Loop], settings: PoseGra
     for loop in (loop for loop in loops if loop.report.accepted):
         graph.add(_factor(loop_edge(loop, rows), cost))
     found = gtsam.LevenbergMarquardtOptimizer(graph, start).optimize()
-    corrected = np.array([pose_row(found.atPose2(index)) for index in range(len(nodes))])
+    corrected = np.array([pose_vector(found.atPose2(index)) for index in range(len(nodes))])
     return contact_map.with_rows(inverse(corrected))
 
 
 def loop_edge(loop: Loop, rows: Array) -> RelativePose:
     """A loop between inverse poses; its covariance is transformed from the earlier object frame to the world."""
     report = loop.report
-    carried = report.displacement.inverse().compose(row_pose(rows[report.earlier])).AdjointMap()
+    carried = report.displacement.inverse().compose(vector_pose(rows[report.earlier])).AdjointMap()
     covariance = carried @ loop.covariance @ carried.T
-    return RelativePose(report.earlier, report.later, pose_row(report.displacement), covariance)
+    return RelativePose(report.earlier, report.later, pose_vector(report.displacement), covariance)
 
 
 def _step(contact_map: ContactMap, index: int, settings: PoseGraphSettings) -> RelativePose:
     """The filter's motion of the object since the previous grasp, between inverse poses (3.23)."""
-    before, pose = (row_pose(row) for row in contact_map.rows[[index - 1, index]])
+    before, pose = (vector_pose(row) for row in contact_map.rows[[index - 1, index]])
     carried = pose.AdjointMap()
     covariance = carried @ _step_covariance(contact_map, index, settings) @ carried.T
-    return RelativePose(index - 1, index, pose_row(before.compose(pose.inverse())), covariance)
+    return RelativePose(index - 1, index, pose_vector(before.compose(pose.inverse())), covariance)
 
 
 def _factor(edge: RelativePose, cost: gtsam.noiseModel.mEstimator.Base | None = None) -> gtsam.BetweenFactorPose2:
     noise = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
     robust = noise if cost is None else gtsam.noiseModel.Robust.Create(cost, noise)
-    return gtsam.BetweenFactorPose2(edge.start, edge.end, row_pose(edge.row), robust)
+    return gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.row), robust)
 
 
 def explains_better(corrected: ContactMap, present: ContactMap) -> bool:

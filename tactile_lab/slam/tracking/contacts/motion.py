@@ -127,24 +127,24 @@ def heavy_tailed_weight(squared: Array) -> Array:
     return np.asarray(1 / (1 + squared / (2 * _TAIL)))
 
 
-def pose_row(world_T_object: Pose2) -> Array:
+def pose_vector(world_T_object: Pose2) -> Array:
     """A planar pose as the vector (x_m, y_m, yaw_rad)."""
     return np.array([world_T_object.x(), world_T_object.y(), world_T_object.theta()])
 
 
-def row_pose(row: Array) -> Pose2:
+def vector_pose(row: Array) -> Pose2:
     """The planar pose of a vector (x_m, y_m, yaw_rad)."""
     return Pose2(float(row[0]), float(row[1]), float(row[2]))
 
 
 def row_pose_in_space(row: Array, height_m: float) -> Pose3:
     """The pose in space of a planar pose vector, its origin at the given height above the table."""
-    return spatial(row_pose(row), height_m)
+    return spatial(vector_pose(row), height_m)
 
 
 def planar_motion(hand_motion_world: Pose3) -> Array:
     """The hand's motion in the table plane as a pose vector: the object rests on the table, so the tilt is ignored."""
-    return pose_row(planar(hand_motion_world))
+    return pose_vector(planar(hand_motion_world))
 
 
 def compose(motion: Array, rows: Array) -> Array:

@@ -17,7 +17,7 @@ from tactile_lab.slam.graph.placement import PlacementSettings, judge_placements
 from tactile_lab.slam.graph.pose_graph import LoopReport
 from tactile_lab.slam.graph.relocation import relocation_candidates
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise, deviation, row_pose
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, deviation, vector_pose
 from tests.support.simulated_contacts import true_map
 
 MISPLACED = 9
@@ -43,7 +43,7 @@ def judged(contact_map: ContactMap, *, as_printed: bool) -> tuple[LoopReport, ..
 
 
 def true_poses() -> list[Pose3]:
-    return [spatial(row_pose(row)) for row in true_map("triangle", count=16).rows]
+    return [spatial(vector_pose(row)) for row in true_map("triangle", count=16).rows]
 
 
 def wrong_of(reports: tuple[LoopReport, ...], poses: list[Pose3]) -> int | None:
@@ -61,7 +61,7 @@ def test_loops_of_a_misplaced_grasp_are_refused() -> None:
     accepted = [report for report in reports if report.accepted]
     assert accepted
     assert all(MISPLACED not in (report.earlier, report.later) for report in accepted)
-    assert wrong_of(reports, [spatial(row_pose(row)) for row in misplaced_map().rows]) == 0
+    assert wrong_of(reports, [spatial(vector_pose(row)) for row in misplaced_map().rows]) == 0
 
 
 def test_a_misplaced_grasp_is_told_where_it_fits_better() -> None:
@@ -104,5 +104,5 @@ def test_displacements_hold_whatever_the_object_frame_s_heading_is() -> None:
 
 
 def compose_right(row: Array, turn: Array) -> Array:
-    pose = row_pose(row).compose(row_pose(turn))
+    pose = vector_pose(row).compose(vector_pose(turn))
     return np.array([pose.x(), pose.y(), pose.theta()])

@@ -16,7 +16,14 @@ from tactile_lab.slam.graph.pose_graph import Loop, LoopReport, PoseGraphSetting
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-from tactile_lab.slam.tracking.contacts.motion import compose, deviation, inverse, planar_motion, pose_row, row_pose
+from tactile_lab.slam.tracking.contacts.motion import (
+    compose,
+    deviation,
+    inverse,
+    planar_motion,
+    pose_vector,
+    vector_pose,
+)
 
 DRIFT_SIGMAS = np.array([0.0015, 0.0015, 0.03])
 NOTHING = np.zeros(3)
@@ -64,8 +71,8 @@ def position_error_m(estimate: ContactMap, truth: ContactMap) -> float:
 def loop(rows: Array, earlier: int, later: int, accepted: bool = True, off: Array = NOTHING) -> Loop:
     """A loop as contacts tell it that touch the same places at poses ``rows``, or places that are ``off``."""
     relative = compose(compose(inverse(rows[earlier]), rows[later]), off)
-    displacement = row_pose(compose(compose(rows[earlier], off), inverse(rows[later])))
-    report = LoopReport(earlier, later, 3, 1.0, 11.3, accepted, "for the test", row_pose(relative), displacement)
+    displacement = vector_pose(compose(compose(rows[earlier], off), inverse(rows[later])))
+    report = LoopReport(earlier, later, 3, 1.0, 11.3, accepted, "for the test", vector_pose(relative), displacement)
     return Loop(report, np.diag([1e-6, 1e-6, 1e-4]))
 
 
@@ -78,7 +85,7 @@ def test_loops_between_true_poses_are_accepted_and_small() -> None:
     for found in accepted:
         rows = contact_map.rows
         true = compose(inverse(rows[found.report.earlier]), rows[found.report.later])
-        assert np.hypot(*deviation(pose_row(found.report.earlier_T_later), true)[:2]) < 0.008
+        assert np.hypot(*deviation(pose_vector(found.report.earlier_T_later), true)[:2]) < 0.008
 
 
 def test_every_refused_loop_says_why() -> None:
@@ -123,7 +130,7 @@ def test_loops_hold_whatever_the_heading_was_when_they_were_found() -> None:
     loops = find_loops(estimate, rectangle_faces(truth), PoseGraphSettings(), list(range(2, 8)))
     assert any(found.report.accepted for found in loops)
     for found in (found for found in loops if found.report.accepted):
-        back = compose(pose_row(found.report.displacement), truth.rows[found.report.later])
+        back = compose(pose_vector(found.report.displacement), truth.rows[found.report.later])
         gap = deviation(back, truth.rows[found.report.earlier])
         assert np.hypot(*gap[:2]) < 0.006
         assert abs(gap[2]) < np.deg2rad(8.0)

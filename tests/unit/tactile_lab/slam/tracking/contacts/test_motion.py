@@ -16,10 +16,10 @@ from tactile_lab.slam.tracking.contacts.motion import (
     deviation,
     inverse,
     planar_motion,
-    pose_row,
-    row_pose,
+    pose_vector,
     row_pose_in_space,
     sample_motion,
+    vector_pose,
 )
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost, pushed_nats
@@ -30,8 +30,8 @@ rows = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3.0, 3.0
 @given(rows, rows)
 @settings(max_examples=30, derandomize=True)
 def test_composition_agrees_with_gtsam(motion: np.ndarray, row: np.ndarray) -> None:
-    expected = row_pose(motion).compose(row_pose(row))
-    assert row_pose(compose(motion, row)).equals(expected, 1e-9)
+    expected = vector_pose(motion).compose(vector_pose(row))
+    assert vector_pose(compose(motion, row)).equals(expected, 1e-9)
 
 
 @given(rows)
@@ -80,7 +80,7 @@ def test_noise_must_be_positive() -> None:
 
 
 def test_a_row_in_space_stands_at_the_given_height() -> None:
-    pose = row_pose_in_space(pose_row(Pose2(0.1, 0.2, 0.3)), 0.022)
+    pose = row_pose_in_space(pose_vector(Pose2(0.1, 0.2, 0.3)), 0.022)
     assert np.allclose(pose.translation(), [0.1, 0.2, 0.022])
     assert pose.rotation().yaw() == pytest.approx(0.3)
 
