@@ -113,6 +113,18 @@ Merge = Annotated[
         metavar="FOLDER", help="Take over the finished runs of this folder, from another machine. Can be repeated."
     ),
 ]
+
+
+def _check_parquet(path: Path | None) -> Path | None:
+    """A package that is missing is named before hours of runs, not after them."""
+    if path is not None:
+        from drivers.core.installed.extras import require_package
+
+        require_package("pyarrow")
+    return path
+
+
 ParquetFile = Annotated[
-    Path | None, typer.Option("--parquet", metavar="FILE", help="Write all runs as a Parquet table, too.")
+    Path | None,
+    typer.Option("--parquet", metavar="FILE", help="Write all runs as a Parquet table, too.", callback=_check_parquet),
 ]

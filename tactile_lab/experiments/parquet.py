@@ -28,8 +28,8 @@ def write_parquet(path: Path, name: str, rows: Sequence[Row]) -> None:
     import pyarrow
     from pyarrow import parquet
 
-    columns = {column: None for row in rows for column in _plain(row)}
     records = [_plain(row) for row in rows]
+    columns = {column: None for record in records for column in record}
     table = pyarrow.table({column: [record.get(column) for record in records] for column in columns})
     table = table.replace_schema_metadata({"experiment": name, "version": version()})
     buffer = pyarrow.BufferOutputStream()
