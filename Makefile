@@ -45,14 +45,18 @@ MUTATIONS ?= 204
 SEED      ?= 1
 PROCESSES ?= 1
 
-mutants: $(READY)  ## Random single mutations of the packages: which of them do the nearest tests notice? (an hour or two)
-	$(BIN)/python -m tests.mutants --count $(MUTATIONS) --seed $(SEED) --processes $(PROCESSES) --out build/mutants.json
+mutants: .coverage  ## Random single mutations of the packages: which of them do the tests of their lines notice? (an hour or two)
+	$(BIN)/python -m tests.mutants --count $(MUTATIONS) --seed $(SEED) --processes $(PROCESSES) --coverage .coverage --out build/mutants.json
+
+# Which test runs which line. `make coverage` makes it anew.
+.coverage:
+	$(MAKE) --no-print-directory coverage
 
 experiments: $(READY)  ## The stored experiments again, by their commands, stored with their pages (days; goes on where it stopped)
 	$(BIN)/tactile-lab experiment commands | while read -r command; do eval "$(BIN)/$$command --store" </dev/null || exit 1; done
 
 coverage: $(READY)  ## All tests, and how much of each package they run through, as a stored result
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "" --cov --cov-report=json
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "" --cov --cov-context=test --cov-report=json
 	$(BIN)/python -m tests.support.package_coverage coverage.json --store
 
 DOCS := build/docs-venv

@@ -14,9 +14,10 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from tests.mutants.covering import Covering
 from tests.mutants.mutations import AREAS, Mutation, draw
 from tests.mutants.nearest import Nearest
 from tests.mutants.trial import Copy, Verdict
@@ -30,7 +31,8 @@ def main() -> int:
     mutations = _survivors_of(options.again) if options.again else draw(ROOT, options.count, options.seed)
     mutations = [mutation for mutation in mutations if mutation.path.startswith(options.only)]
     verdicts = []
-    for verdict in tried(mutations, options.processes, options.files, options.limit):
+    covering = Covering(ROOT, options.coverage) if options.coverage else None
+    for verdict in tried(mutations, options.processes, Choice(Nearest(ROOT), covering, options.files), options.limit):
         verdicts.append(verdict)
         print(f"{len(verdicts):4d}/{len(mutations)} {_line(verdict)}", flush=True)
         if options.out:
@@ -43,9 +45,24 @@ def main() -> int:
     return 0
 
 
-def tried(mutations: list[Mutation], processes: int, files: int, limit_s: float) -> Iterator[Verdict]:
+@dataclass(frozen=True)
+class Choice:
+    """The tests that a mutation has to survive: those known to run its lines, otherwise the nearest files."""
+
+    nearest: Nearest
+    covering: Covering | None
+    files: int
+
+    def tests(self, mutation: Mutation) -> list[str]:
+        """Tests or whole files, the nearest first."""
+        files = self.nearest.tests(mutation.path)
+        lines = range(mutation.line, mutation.line + mutation.before.count("\n"))
+        found = [self.covering.tests(mutation.path, line, files) for line in lines] if self.covering else []
+        return next(filter(None, found), files[: self.files])
+
+
+def tried(mutations: list[Mutation], processes: int, choice: Choice, limit_s: float) -> Iterator[Verdict]:
     """Verdicts as they come, from as many copies of the tree as there are processes."""
-    nearest = Nearest(ROOT)
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder, ThreadPoolExecutor(processes) as threads:
         copies: queue.Queue[Copy] = queue.Queue()
         for number in range(processes):
@@ -54,7 +71,7 @@ def tried(mutations: list[Mutation], processes: int, files: int, limit_s: float)
         def verdict(mutation: Mutation) -> Verdict:
             copy = copies.get()
             try:
-                return copy.verdict(mutation, nearest.tests(mutation.path)[:files], limit_s)
+                return copy.verdict(mutation, choice.tests(mutation), limit_s)
             finally:
                 copies.put(copy)
 
@@ -69,9 +86,12 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--count", type=int, default=60, help="mutations to draw, evenly over the areas")
     parser.add_argument("--seed", type=int, default=1, help="which mutations are drawn")
     parser.add_argument("--processes", type=int, default=1, help="mutations tried at the same time")
-    parser.add_argument("--files", type=int, default=4, help="test files a mutation has to survive, the nearest ones")
+    parser.add_argument("--files", type=int, default=4, help="nearest test files, for lines no test is known to run")
     parser.add_argument(
         "--limit", type=float, default=60.0, help="seconds of processor time for the tests of one mutation"
+    )
+    parser.add_argument(
+        "--coverage", type=Path, help="what `make coverage` left (.coverage): ask just the tests that run the lines"
     )
     parser.add_argument("--only", default="", help="only files whose path begins with this")
     parser.add_argument("--out", type=Path, help="JSON file that keeps the verdicts")
@@ -99,7 +119,7 @@ def _store(file: Path, verdicts: list[Verdict]) -> None:
 
 def _line(verdict: Verdict) -> str:
     mutation = verdict.mutation
-    told = verdict.by or f"{verdict.tests} files"
+    told = verdict.by or f"{verdict.tests} tests"
     return f"{verdict.outcome:8} {mutation.path}:{mutation.line} ({mutation.kind}) {told}, {verdict.seconds:.0f} s"
 
 

@@ -91,7 +91,8 @@ class Copy:
         start_s = self.spent_s
         outcome, by = "survived", ""
         # The nearest file alone at first: most mutations end there, and importing the others takes longer.
-        for group in filter(None, (tests[:1], tests[1:])):
+        near = [test for test in tests if _file(test) == _file(tests[0])]
+        for group in filter(None, (near, [test for test in tests if test not in near])):
             left_s = start_s + limit_s - self.spent_s
             if outcome == "survived" and left_s > 0:
                 outcome, by = self._outcome(mutation.path, original, mutated, group, left_s)
@@ -205,6 +206,10 @@ def _spent_s(process: int) -> float:
     except OSError:
         return 0.0  # it has just ended
     return sum(map(int, figures[11:15])) / os.sysconf("SC_CLK_TCK")
+
+
+def _file(test: str) -> str:
+    return test.partition("::")[0]
 
 
 def _failed(lines: list[str]) -> str:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
+import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from coverage import CoverageData
 
+from tests.mutants.__main__ import Choice
+from tests.mutants.covering import Covering
 from tests.mutants.mutations import AREAS, Mutation, draw, means_something_else, mutations_of
 from tests.mutants.nearest import Nearest
 from tests.mutants.trial import Copy
@@ -152,3 +158,23 @@ def test_mutations_are_killed_survive_or_never_end_and_the_tree_stays_as_it_is(t
 
 def test_a_mutation_that_no_test_reaches_survives(copy: Copy) -> None:
     assert copy.verdict(mutation("    number = 0", "    number = 1"), [], 60.0).outcome == "survived"
+
+
+def test_tests_that_run_a_line_are_asked_before_the_nearest_files(tree: Path, tmp_path: Path) -> None:
+    pytest_words = [sys.executable, "-m", "pytest", "-q", "tests/unit/test_clamping.py", "-p", "no:cacheprovider"]
+    cov = ["--cov=drivers", "--cov-context=test", "--cov-report="]
+    environment = os.environ | {"COVERAGE_FILE": str(tmp_path / "covered"), "PYTHONPATH": str(tree)}
+    subprocess.run([*pytest_words, *cov], cwd=tree, env=environment, capture_output=True)
+    choice = Choice(Nearest(tree), Covering(tree, tmp_path / "covered"), files=1)
+
+    low = mutation("        return low", "        return -low")
+    line = SOURCE.splitlines().index("    if not value > low:") + 1
+    assert choice.tests(replace(low, line=line)) == ["tests/unit/test_clamping.py::test_high"]
+    imported = replace(low, line=SOURCE.splitlines().index("    value: float = 2.5") + 1)
+    assert choice.tests(imported) == ["tests/unit/test_clamping.py"]
+
+
+def test_coverage_that_names_no_test_is_refused(tmp_path: Path) -> None:
+    CoverageData(str(tmp_path / "covered")).write()
+    with pytest.raises(ValueError, match="--cov-context=test"):
+        Covering(tmp_path, tmp_path / "covered")

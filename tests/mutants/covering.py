@@ -1,0 +1,36 @@
+"""Which tests run a line: what coverage recorded with the test that was running as its context."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from coverage import CoverageData
+
+
+class Covering:
+    """Tests by the lines they run, as ``pytest --cov --cov-context=test`` stored them for the same tree.
+
+    :raises ValueError: if the file names no test.
+    """
+
+    def __init__(self, root: Path, file: Path) -> None:
+        self._root = root
+        self._data = CoverageData(str(file))
+        self._data.read()
+        if not any(self._data.measured_contexts()):
+            raise ValueError(f"{file} does not say which test ran which line: make it with --cov-context=test")
+        self._lines: dict[str, dict[int, list[str]]] = {}
+
+    def tests(self, path: str, line: int, files: list[str]) -> list[str]:
+        """Tests that run a line, in the order in which their files are given; files that are not given come last.
+
+        None are known of lines that run while a module is imported, or in another process.
+        """
+        if path not in self._lines:
+            self._lines[path] = self._data.contexts_by_lineno(str(self._root / path))
+        contexts = self._lines[path].get(line, [])
+        order = {file: number for number, file in enumerate(files)}
+        return sorted(
+            {context.rpartition("|")[0] for context in contexts if "|" in context},
+            key=lambda test: (order.get(test.partition("::")[0], len(order)), test),
+        )
