@@ -7,6 +7,7 @@ such places the interruption is delayed or raised again until the code outside c
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -14,13 +15,16 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+INTERRUPTED = 130
+"""Exit code of a program that was interrupted."""
+
 Unraisable = Callable[["sys.UnraisableHookArgs"], Any]
 
 _AGAIN_s = 0.05
 """Delay before it is raised again."""
 _IMPORTS = "<frozen importlib"
-_FORGETFUL = {"trimesh", "networkx"}
-"""Libraries that catch every exception and continue."""
+_FORGETFUL = {"trimesh", "networkx", "pydantic"}
+"""Libraries that catch every exception and continue, or take it for a wrong value."""
 
 
 @contextmanager
@@ -38,10 +42,34 @@ def interruptions_heeded() -> Iterator[None]:
     try:
         yield
     finally:
+        # Python ends by the signal, not by the exit code, after an interruption in text that a library evaluates: until
+        # the next such text.
+        eval("None")
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def nothing_begun() -> Iterator[None]:
+    """Within the block an interruption leaves at once, as long as there is nothing to put in order.
+
+    An exception would not do while libraries are loaded: some swallow it.
+    """
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(number, _leave)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _leave(number: int, frame: FrameType | None) -> None:
+    os._exit(INTERRUPTED)
 
 
 def _on_interrupt(number: int, frame: FrameType | None) -> None:

@@ -15,10 +15,9 @@ from collections.abc import Callable, Sequence
 
 from drivers.core.errors import TactileLabError
 from drivers.core.extensions import blamed
-from tactile_lab.cli.interruptions import interruptions_heeded
+from tactile_lab.cli.interruptions import INTERRUPTED, interruptions_heeded, nothing_begun
 from tactile_lab.cli.streams import open_missing_streams
 
-INTERRUPTED = 130
 _NO_MEMORY = "the memory is exhausted. Close other programs, or raise the limit (ulimit -v)"
 
 # Sums of several BLAS threads come out in another order, and a replay must give the same bytes on any machine.
@@ -42,8 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     open_missing_streams()
     try:
         with interruptions_heeded():
-            from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
-
+            with nothing_begun():
+                from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
             _run(app, arguments)
     except TactileLabError as error:
         from tactile_lab.cli.console import complain
