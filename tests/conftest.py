@@ -26,6 +26,11 @@ settings.register_profile("tests", deadline=None, suppress_health_check=[HealthC
 settings.load_profile("tests")
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Three workers for two cores: a third of the time a test waits for a device, a page or another process."""
+    return max(1, 3 * len(os.sched_getaffinity(0)) // 2)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
     """What is collected stays to the end: looking through it for garbage again and again takes a fifth of the time."""

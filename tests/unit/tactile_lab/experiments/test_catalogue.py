@@ -58,6 +58,14 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "graph-stress": ({"solver": ["Cauchy", "ours"]}, None),
 }
 
+# Whole sessions on the simulated rig, and whole surfaces.
+LENGTHY = ("crash-recovery", "everyday-objects", "exploration-hand", "forearm-on-rig", "hands")
+
+
+def marked(study: Experiment) -> object:
+    """The experiment as a parameter of a test, of a long one if it takes seconds."""
+    return pytest.param(study, id=study.name, marks=[pytest.mark.long] if study.name in LENGTHY else [])
+
 
 @cache
 def tiny_rows(name: str) -> list[Row]:
@@ -66,7 +74,7 @@ def tiny_rows(name: str) -> list[Row]:
     return [execute(cell, study.work) for cell in study.cells([0], only, grasps)]
 
 
-@pytest.mark.parametrize("study", EXPERIMENTS.values(), ids=lambda study: study.name)
+@pytest.mark.parametrize("study", [marked(study) for study in EXPERIMENTS.values()])
 def test_every_experiment_runs_and_is_reported(study: Experiment, tmp_path: Path) -> None:
     rows = tiny_rows(study.name)
     assert 0 < len(rows) <= 6
@@ -78,6 +86,7 @@ def test_every_experiment_runs_and_is_reported(study: Experiment, tmp_path: Path
     assert (tmp_path / "results.md").read_text().count("| --- ") >= 1
 
 
+@pytest.mark.long
 def test_the_forearms_wizard_finds_a_displaced_mount_through_the_physics() -> None:
     (row,) = tiny_rows("forearm-on-rig")
     assert row.figures is not None
