@@ -60,8 +60,3 @@ class HandForm:
 
 RIGHT_HAND = HandForm()
 """The right hand with five fingers."""
-
-
-def form_of(motors: MotorMap) -> HandForm:
-    """The form of the hand that a motor map belongs to."""
-    return HandForm(motors.told_side or "right", motors.driven)
