@@ -11,7 +11,7 @@ from functools import cached_property
 
 from drivers.core.contacts import FINGERS
 from drivers.shadow.model.kinematics import JOINTS
-from drivers.shadow.model.motors import DRIVEN_JOINTS, MotorMap, angles_of_driven
+from drivers.shadow.model.motors import DRIVEN_JOINTS, angles_of_driven
 from drivers.shadow.protocol.palm_images import Side
 
 
