@@ -85,6 +85,8 @@ def test_quality_has_residuals_held_out_ones_repeats_and_a_verdict(touches):
     strict = judge(problem, problem.solve(), QualityLimits(region_mm=0.01))
     assert not strict.passed
     assert any("95 % region" in str(judgement) for judgement in strict.judgements if not judgement.ok)
+    regions = {judged.unit: judged.value for judged in found.judgements if judged.name == "95 % region"}
+    assert regions == {"mm": 1e3 * max(found.region_m), "deg": np.degrees(max(found.region_rad))}
 
 
 def test_touches_of_the_top_alone_are_refused_with_the_direction(touches):
