@@ -10,6 +10,7 @@ from pydantic import Field, field_validator
 from drivers.camera.markers import known_dictionary
 from drivers.core.configuration import StrictModel
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import refuse_unreachable
 
 Kind = Literal["device", "gstreamer", "folder", "video", "simulated"]
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -74,6 +75,7 @@ def place_of(source: str) -> Place:
     if source.isdigit() or source.startswith("/dev/"):
         return Place("device", source)
     path = Path(source)
+    refuse_unreachable(path)
     if path.is_dir():
         return Place("folder", source)
     if path.is_file():

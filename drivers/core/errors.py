@@ -6,6 +6,7 @@ TactileLabError                exit 1
  |   `- CodecError                      bytes that do not follow the protocol
  |- SafetyError                exit 1   a limit of the hand or the workspace was exceeded: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
+ |   |- SessionDataError   exit 2   a session that was given: missing, damaged, or without what is asked for
  |   `- EstimationError                 a program error during estimation or planning
  |- WriteError                 exit 1   a file that cannot be written: a full disk, a folder one may not write to
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
@@ -18,6 +19,7 @@ Exit codes are those of the command line, see :mod:`tactile_lab.cli.main`.
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -69,6 +71,12 @@ class SessionError(TactileLabError):
     """A session folder or traffic file that cannot be read or written."""
 
 
+class SessionDataError(SessionError):
+    """A session that was given, its recording or its results are missing, damaged, or lack what is asked for."""
+
+    exit_code = 2
+
+
 class EstimationError(SessionError):
     """A program error in the estimation or planning of a running session; its notes say where."""
 
@@ -98,3 +106,9 @@ def given_by_a_person() -> Iterator[None]:
         yield
     except (ShapeError, SessionError) as error:
         raise ConfigurationError(error.what, where=error.where, hint=error.hint) from error
+
+
+def refusal(error: OSError) -> str:
+    """Why the system refused something, in its own words: those of a library around them are left out."""
+    words = os.strerror(error.errno) if error.errno is not None and error.errno > 0 else error.strerror
+    return words or "no answer"

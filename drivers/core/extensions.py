@@ -19,6 +19,7 @@ from pathlib import Path
 
 from drivers.core.errors import ConfigurationError, TactileLabError
 from drivers.core.installed.entries import explain
+from drivers.core.reading.bounded_files import refuse_unreachable
 from drivers.core.registry import Registry
 
 VARIABLE = "TACTILE_LAB_EXTENSIONS"
@@ -71,6 +72,7 @@ def blamed(error: BaseException) -> str:
 
 
 def _import(path: Path, name: str) -> None:
+    refuse_unreachable(path)
     if not path.is_file():
         raise ConfigurationError("no such extension", where=str(path), hint="Check its path")
     spec = importlib.util.spec_from_file_location(name, path)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.installed.extras import require_package
-from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
+from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size, refuse_unreachable
 from drivers.simulation.object_names import LYING, STANDING, posed_path
 
 LARGEST_m, SMALLEST_m = 0.25, 0.01
@@ -106,6 +106,7 @@ def _laid(down: Array, stands: Array, pose: str, where: str) -> Array:
 
 
 def _read(path: Path) -> trimesh.Trimesh:
+    refuse_unreachable(path)
     if not path.is_file():
         raise ConfigurationError("file not found", where=str(path), hint="Check the path of the mesh")
     check_size(path, LARGEST_MESH_bytes)

@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from drivers.core.atomic_files import writing_into
-from drivers.core.errors import ConfigurationError, SessionError, given_by_a_person
+from drivers.core.errors import ConfigurationError, WriteError, given_by_a_person
 from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.session_ids import check_id
@@ -45,7 +45,7 @@ def export_archive(session: Session, path: Path) -> int:
 
     Raises:
         ConfigurationError: the file exists.
-        SessionError: it cannot be written.
+        WriteError: it cannot be written.
     """
     files = [item for item in sorted(session.folder.rglob("*")) if item.is_file() and not item.is_symlink()]
     try:
@@ -58,7 +58,7 @@ def export_archive(session: Session, path: Path) -> int:
     except OSError as error:
         with suppress(OSError):
             path.unlink(missing_ok=True)
-        raise SessionError(f"cannot be written ({error.strerror})", where=str(path), hint="Check the disk") from error
+        raise WriteError(f"cannot be written ({error.strerror})", where=str(path), hint="Check the disk") from error
     return len(files)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from drivers.core.atomic_files import writing_into
 from drivers.core.clock import NANOSECONDS
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError, WriteError
 from sessions.recording.manifest import write_manifest
 from sessions.recording.session import CALIBRATION, TRAFFIC, Session
 from sessions.recording.session_ids import check_id
@@ -43,8 +43,9 @@ def extract(session: Session, into: Path, piece: Piece) -> dict[str, int]:
     Returns the number of messages by topic. Session events are kept, so that the extract can be replayed.
 
     Raises:
-        SessionError: the recording cannot be read, or the extract would be empty.
-        ConfigurationError: the folder exists, or the recording does not have a transport.
+        SessionError: the recording cannot be read.
+        ConfigurationError: the folder exists, the recording does not have a transport, or the extract would be empty.
+        WriteError: the folder cannot be made or written.
     """
     check_id(into.name, str(into))
     try:
@@ -53,7 +54,7 @@ def extract(session: Session, into: Path, piece: Piece) -> dict[str, int]:
         if isinstance(error, FileExistsError):
             raise ConfigurationError("exists already", where=str(into), hint="Choose another folder") from error
         what = f"cannot be made ({error.strerror})"
-        raise SessionError(what, where=str(into), hint="Choose another folder") from error
+        raise WriteError(what, where=str(into), hint="Choose another folder") from error
     try:
         counts = _copy_traffic(session.traffic(), into, session.manifest.name, piece)
         with writing_into(into):
@@ -100,7 +101,7 @@ def _check(piece: Piece, transports: Collection[str], counts: Mapping[str, int],
         hint = f"Its transports are {', '.join(sorted(transports))}"
         raise ConfigurationError(f"no transport called {', '.join(sorted(unknown))}", where=where, hint=hint)
     if not any(counts.values()):
-        raise SessionError(
+        raise ConfigurationError(
             "nothing was recorded in that part", where=where, hint="Choose another time span or other transports"
         )
 

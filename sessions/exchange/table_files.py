@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from drivers.core.clock import NANOSECONDS
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, TactileLabError, WriteError
 from drivers.core.installed.extras import LazyPackage
 from sessions.exchange.sample_tables import SampleTables, Table
 
@@ -25,7 +25,8 @@ def write_csv(tables: SampleTables, folder: Path) -> int:
     """Write a CSV file per table into a new folder, and pictures as files into a subfolder. Returns the number of rows.
 
     Raises:
-        SessionError: the folder exists or cannot be written.
+        ConfigurationError: the folder exists.
+        WriteError: it cannot be written.
     """
     try:
         folder.mkdir(parents=True)
@@ -47,7 +48,8 @@ def write_hdf5(tables: SampleTables, path: Path) -> int:
     bytes in ``pictures/encoded``.
 
     Raises:
-        SessionError: the file exists or cannot be written.
+        ConfigurationError: the file exists.
+        WriteError: it cannot be written.
     """
     try:
         with h5py.File(path, "x") as file:
@@ -100,6 +102,7 @@ def _write_pictures(group: h5py.Group, pictures: list[tuple[int, bytes]]) -> Non
         encoded[place] = np.frombuffer(content, np.uint8)
 
 
-def _unwritable(path: Path, error: OSError) -> SessionError:
-    what = "exists already" if path.exists() else f"cannot be written ({error.strerror or error})"
-    return SessionError(what, where=str(path), hint="Choose another name")
+def _unwritable(path: Path, error: OSError) -> TactileLabError:
+    if path.exists():
+        return ConfigurationError("exists already", where=str(path), hint="Choose another name")
+    return WriteError(f"cannot be written ({error.strerror or error})", where=str(path), hint="Choose another name")

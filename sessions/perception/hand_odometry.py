@@ -8,7 +8,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import StepSigma
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 from drivers.core.poses import planar, spatial
 from sessions.perception.carrying.carry import Carry
 
@@ -96,12 +96,12 @@ class HandOdometry:
     def undo(self) -> None:
         """Return the last grasp's motion to the next one. Raises SessionError if there is no grasp."""
         if not self._taken:
-            raise SessionError("undo without a grasp", where="/marks", hint="The session events are out of order")
+            raise SessionDataError("undo without a grasp", where="/marks", hint="The session events are out of order")
         self._motion = self._taken.pop().then(self._motion)
 
     def _add(self, world_T_palm: Pose3, carry: Carry | None) -> None:
         if self._hold_start is None:
-            raise SessionError(
+            raise SessionDataError(
                 "hold_end without hold_begin", where="/marks", hint="The session events are out of order"
             )
         palm_motion = world_T_palm * self._hold_start.inverse()

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
-from drivers.core.errors import DeviceError, SessionError
+from drivers.core.errors import DeviceError, SessionDataError
 from drivers.core.fingertip import FingertipSensor
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from sessions.perception.approach_paths import TipSurface, approach_paths
@@ -306,7 +306,7 @@ class Perception:
         capture, self._capture = self._capture, None
         if capture is None:
             text = f"{event.kind.value} without capture_begin"
-            raise SessionError(text, where="/marks", hint="The session events are out of order")
+            raise SessionDataError(text, where="/marks", hint="The session events are out of order")
         joints_rad, base_q = self._placement.latest()
         geometry = self._placement.place(capture.joints(joints_rad), capture.base(base_q))
         tips = self._selection.touches(geometry, heard=bool(capture.joints_rad))

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.reading.bounded_files import refuse_unreachable
 from sessions.recording.manifest import MANIFEST
 from sessions.recording.session import TRAFFIC, Session
-from sessions.recording.session_ids import recovered_id
+from sessions.recording.session_ids import LAST, recovered_id
 from sessions.recording.traffic.mcap_frames import ends_well
 from sessions.recording.traffic.reader import segment_paths
+
+_STARTED = re.compile(r"\d{8}-\d{6}")
+"""How the name of a recorded session begins; later ones sort behind earlier ones."""
+_STARTED_DIGITS = 15
 
 
 @dataclass(frozen=True)
@@ -106,13 +112,19 @@ def list_sessions(root: Path) -> list[SessionSummary]:
     if not root.exists():
         return []
     try:
-        folders = sorted(
-            entry for entry in root.iterdir() if (entry / MANIFEST).is_file() or (entry / TRAFFIC).is_file()
-        )
+        folders = sorted(entry for entry in root.iterdir() if _is_session(entry))
     except OSError as error:
         hint = "Name a folder of sessions"
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(root), hint=hint) from error
     return sorted(map(summarize, folders), key=lambda item: (item.started_utc, len(item.derived), item.name))
+
+
+def _is_session(folder: Path) -> bool:
+    """Whether it is a session's folder; one that the user may not look into hides no others."""
+    try:
+        return (folder / MANIFEST).is_file() or (folder / TRAFFIC).is_file()
+    except PermissionError:
+        return False
 
 
 def find_session(root: Path, name: str) -> Session:
@@ -133,10 +145,12 @@ def session_folder(root: Path, name: str) -> Path:
     """The folder of a session, which may be damaged; named as for :func:`find_session`.
 
     Raises:
-        ConfigurationError: there is none.
+        ConfigurationError: there is none, or it is not certain which is the last.
     """
-    if name == "last":
+    if name == LAST:
         return _last_recorded(root)
+    for path in (root / name, Path(name)):
+        refuse_unreachable(path)
     folder = root / name if (root / name).is_dir() else Path(name)
     if not folder.is_dir():
         raise ConfigurationError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
@@ -145,10 +159,28 @@ def session_folder(root: Path, name: str) -> Path:
     return folder
 
 
+def _refuse_hidden(last: SessionSummary, unreadable: list[SessionSummary]) -> None:
+    """An older session is not taken for the last one where a later one, by its name, cannot be read. Raises
+    ConfigurationError.
+    """
+    for item in unreadable:
+        if _STARTED.match(item.folder.name) and item.folder.name[:_STARTED_DIGITS] > last.folder.name:
+            hint = f"Give a name, or recover it: tactile-lab session recover {item.folder}"
+            what = f"is the last session, and cannot be read ({item.problem})"
+            raise ConfigurationError(what, where=str(item.folder), hint=hint)
+
+
 def _last_recorded(root: Path) -> Path:
-    readable = [item for item in list_sessions(root) if item.readable]
+    found = list_sessions(root)
+    readable = [item for item in found if item.readable]
     recorded = [item for item in readable if item.recorded_here]
+    if any(item.folder.name == LAST for item in found):
+        hint = f"'last' means the newest session; give a path: {root / LAST}"
+        raise ConfigurationError("is the name of a session here", where=LAST, hint=hint)
     if recorded:
+        names = {item.folder.name for item in readable}
+        hidden = [item for item in found if not item.readable and recovered_id(item.folder.name) not in names]
+        _refuse_hidden(recorded[-1], hidden)
         return recorded[-1].folder
     if readable:
         names = ", ".join(item.folder.name for item in readable[-3:])

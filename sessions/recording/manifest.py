@@ -14,7 +14,8 @@ from pydantic import Field
 from drivers.core.atomic_files import write_whole
 from drivers.core.clock import utc_text
 from drivers.core.configuration import StrictModel, load, loads, validate
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError, SessionDataError, SessionError
+from drivers.core.reading.bounded_files import refuse_unreachable
 from sessions.recording.traffic.formats import converted_manifest
 
 Status = Literal["open", "closed", "interrupted", "failed", "recovered"]
@@ -112,13 +113,17 @@ def read_manifest(folder: Path) -> Manifest:
     Raises:
         SessionError: there is none, it is not a strict document of this form, or a newer version wrote it.
     """
+    try:
+        refuse_unreachable(folder / MANIFEST)
+    except ConfigurationError as error:
+        raise SessionDataError(error.what, where=error.where, hint=error.hint) from error
     if not (folder / MANIFEST).is_file():
-        raise SessionError("not a session folder (no session.yaml)", where=str(folder), hint="Check the path")
+        raise SessionDataError("not a session folder (no session.yaml)", where=str(folder), hint="Check the path")
     where = str(folder / MANIFEST)
     try:
         return _validate(load(folder / MANIFEST), where)
     except ConfigurationError as error:
-        raise SessionError(error.what, where=error.where, hint="The session's other files are unchanged") from error
+        raise SessionDataError(error.what, where=error.where, hint="The session's other files are unchanged") from error
 
 
 def manifest_from(content: bytes, where: str) -> Manifest:
@@ -126,7 +131,7 @@ def manifest_from(content: bytes, where: str) -> Manifest:
     try:
         return _validate(loads(content, where), where)
     except ConfigurationError as error:
-        raise SessionError(error.what, where=error.where) from error
+        raise SessionDataError(error.what, where=error.where) from error
 
 
 def _validate(content: Any, where: str) -> Manifest:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from drivers.core.atomic_files import write_whole, writing_into
 from drivers.core.clock import NANOSECONDS
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError, SessionError
 from sessions.recording.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest
 from sessions.recording.session import CALIBRATION, RESULTS, TRAFFIC, TRAJECTORY, new_folder
 from sessions.recording.session_ids import recovered_id
@@ -83,7 +83,7 @@ def recover(source: Path, root: Path | None = None) -> Recovery:
         WriteError: the new folder cannot be written.
     """
     if being_written(source / TRAFFIC):
-        raise SessionError("is being recorded", where=str(source), hint="Wait until the session has ended")
+        raise SessionDataError("is being recorded", where=str(source), hint="Wait until the session has ended")
     reader = TrafficReader(source / TRAFFIC)
     manifest = _manifest(source, reader)
     if manifest.status not in ("open", "failed") and not _read_through(reader):
@@ -101,7 +101,7 @@ def _recover_into(folder: Path, source: Path, manifest: Manifest, reader: Traffi
         _copy_files(source, folder, reader)
     written, topics = _copy_traffic(reader, folder)
     if not written:
-        raise SessionError("contains no readable message", where=str(reader.path), hint="Nothing can be recovered")
+        raise SessionDataError("contains no readable message", where=str(reader.path), hint="Nothing can be recovered")
     _count_again(folder, written)
     recovery = Recovery(source, folder, topics, reader.loss, _result_folders(source))
     write_manifest(folder, _recovered_manifest(manifest, folder, written, recovery))

@@ -22,7 +22,7 @@ from typing import Any, Self
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.clock import utc_text
-from drivers.core.errors import SessionError, TactileLabError
+from drivers.core.errors import SessionDataError, SessionError, TactileLabError
 from sessions.recording.deferred_interruption import interruption_deferred
 from sessions.recording.manifest import (
     MANIFEST,
@@ -86,11 +86,11 @@ class Session:
             SessionError: there is none for that role, or it was changed.
         """
         if role not in self.manifest.calibration:
-            raise SessionError(f"no calibration called {role!r}", where=str(self.folder / MANIFEST))
+            raise SessionDataError(f"no calibration called {role!r}", where=str(self.folder / MANIFEST))
         copy = self.manifest.calibration[role]
         path = self.folder / CALIBRATION / copy.file
         if _sha256(_read(path)) != copy.sha256:
-            raise SessionError("changed since the recording", where=str(path), hint="Restore the recorded file")
+            raise SessionDataError("changed since the recording", where=str(path), hint="Restore the recorded file")
         return path
 
     @property
@@ -310,7 +310,7 @@ def _read(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror})", where=str(path)) from error
+        raise SessionDataError(f"cannot be read ({error.strerror})", where=str(path)) from error
 
 
 def _sha256(content: bytes) -> str:

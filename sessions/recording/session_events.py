@@ -12,7 +12,7 @@ from enum import StrEnum
 from typing import Any
 
 from drivers.core.contacts import FINGERS
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 
 
 class EventKind(StrEnum):
@@ -71,11 +71,11 @@ class SessionEvent:
             fingers = tuple(str(finger) for finger in content.get("fingers", FINGERS))
             event = cls(EventKind(content["kind"]), int(content["stamp_ns"]), fingers)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-            raise SessionError(
+            raise SessionDataError(
                 f"not a session event that this version knows ({error!r})",
                 where=where,
                 hint="Use the version that recorded it",
             ) from error
         if unknown := set(fingers) - set(FINGERS):
-            raise SessionError(f"the session event names unknown fingers {sorted(unknown)}", where=where)
+            raise SessionDataError(f"the session event names unknown fingers {sorted(unknown)}", where=where)
         return event

@@ -7,11 +7,13 @@ import re
 from drivers.core.errors import ConfigurationError
 
 LONGEST_ID = 64
+LAST = "last"
+"""Means the newest session wherever one is named; no session is called so."""
 _ID = re.compile(r"[a-z0-9_-]{1,64}")
 
 
 def check_id(name: str, where: str = "") -> str:
-    """Check that a name is a session id: 1 to 64 of a-z, 0-9, underscore and hyphen.
+    """Check that a name is a session id: 1 to 64 of a-z, 0-9, underscore and hyphen, and not ``last``.
 
     Raises:
         ConfigurationError: it is not.
@@ -22,6 +24,9 @@ def check_id(name: str, where: str = "") -> str:
             where=where,
             hint=f"Names have 1 to {LONGEST_ID} of the characters a-z, 0-9, _ and -",
         )
+    if name == LAST:
+        hint = "Choose another name"
+        raise ConfigurationError(f"{LAST!r} means the newest session, and can be no name", where=where, hint=hint)
     return name
 
 

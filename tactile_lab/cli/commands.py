@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
+from drivers.core.reading.bounded_files import refuse_unreachable
 from drivers.core.registry import Registry
 
 COMMANDS: Registry[Callable[..., None] | typer.Typer] = Registry("command")
@@ -41,7 +43,7 @@ class Commands(TyperGroup):
             return None
         if cmd_name not in self.commands:
             self.commands[cmd_name] = command = _command(cmd_name)
-            _refuse_infinite_numbers(command)
+            _check_values(command)
         return self.commands[cmd_name]
 
 
@@ -56,21 +58,25 @@ def _command(name: str) -> Any:
     return typer.main.get_command(holder)
 
 
-def _refuse_infinite_numbers(command: Any) -> None:
-    """No option of a command, or of its commands, takes nan or inf for a number: bounds alone let them through."""
+def _check_values(command: Any) -> None:
+    """No option of a command, or of its commands, takes nan or inf for a number, which bounds alone let through, or a
+    path of which nothing can be found out.
+    """
     for parameter in command.params:
-        parameter.callback = _finite(parameter.callback)
+        parameter.callback = _checked(parameter.callback)
     for inner in getattr(command, "commands", {}).values():
-        _refuse_infinite_numbers(inner)
+        _check_values(inner)
 
 
-def _finite(then: Callable[..., Any] | None) -> Callable[..., Any]:
-    """A parameter's callback that refuses numbers which are none, before its own callback. Raises BadParameter."""
+def _checked(then: Callable[..., Any] | None) -> Callable[..., Any]:
+    """A parameter's callback that checks values before its own callback. Raises BadParameter, ConfigurationError."""
 
     def check(ctx: Any, parameter: Any, value: Any) -> Any:
-        for number in value if isinstance(value, tuple | list) else [value]:
-            if isinstance(number, float) and not math.isfinite(number):
-                raise typer.BadParameter(f"must be a finite number, not {number}", ctx=ctx, param=parameter)
+        for item in value if isinstance(value, tuple | list) else [value]:
+            if isinstance(item, float) and not math.isfinite(item):
+                raise typer.BadParameter(f"must be a finite number, not {item}", ctx=ctx, param=parameter)
+            if isinstance(item, Path):
+                refuse_unreachable(item)
         return value if then is None else then(ctx, parameter, value)
 
     return check

@@ -13,7 +13,7 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 
-from drivers.core.errors import TactileLabError
+from drivers.core.errors import TactileLabError, refusal
 from drivers.core.extensions import blamed
 from tactile_lab.cli.interruptions import INTERRUPTED, interruptions_heeded, nothing_begun
 from tactile_lab.cli.streams import open_missing_streams
@@ -65,7 +65,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         complain(_NO_MEMORY)
         sys.exit(1)
     except Exception as error:
-        if not (words := _NO_MEMORY if _lacks_memory(error) else blamed(error)):
+        if not (words := _NO_MEMORY if _lacks_memory(error) else blamed(error) or _unusable_path(error)):
             raise
         from tactile_lab.cli.console import complain
 
@@ -91,6 +91,13 @@ def _lacks_memory(error: Exception) -> bool:
     """Whether the system refused memory by another error than MemoryError: for a thread's stack, or a library."""
     refused = isinstance(error, OSError) and error.errno == errno.ENOMEM
     return refused or (isinstance(error, RuntimeError) and "can't start new thread" in str(error))
+
+
+def _unusable_path(error: Exception) -> str:
+    """A file or folder that the system refused where nobody asked before; empty for any other error."""
+    if not isinstance(error, OSError) or error.filename is None:
+        return ""
+    return f"{error.filename}: cannot be used ({refusal(error)}). Check the path, the disk and permissions"
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:

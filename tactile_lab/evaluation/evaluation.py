@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 from tactile_lab.evaluation.consistency.figures import ConsistencyFigures
 from tactile_lab.evaluation.dimensions import Extent
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, Truth
@@ -116,7 +116,7 @@ def evaluate(folder: Path, truth: Truth, object_name: str) -> Evaluation:
     results, poses = estimate.results, estimate.poses
     if len(poses) != len(truth.world_T_object):
         counts = f"{len(poses)} grasps in the results, {len(truth.world_T_object)} in the session"
-        raise SessionError(counts, where=str(folder), hint="Replay the session to update its results")
+        raise SessionDataError(counts, where=str(folder), hint="Replay the session to update its results")
     _, incomparable = estimate.shape
     figures, failures = computed(estimate)
     ours = {each.name: figures.pop(each.name) for each in fields(Evaluation) if each.name in figures}

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO
 
 from drivers.core.atomic_files import write_whole
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.cells import Cell, Row, Work, execute
 from tactile_lab.experiments.execution.cluster import run_on_cluster
 from tactile_lab.experiments.execution.process_pool import run_in_processes
@@ -69,7 +69,8 @@ def run_cells(
         finished: called after each run.
 
     Raises:
-        SessionError: the file belongs to another experiment, cannot be read, or a process died.
+        ConfigurationError: the file belongs to another experiment, or cannot be read.
+        SessionError: a process died.
         ConfigurationError: the cluster cannot be used.
         WriteError: the file cannot be written.
     """
@@ -98,17 +99,17 @@ def _execute(cells: Sequence[Cell], work: Work, settings: RunnerSettings) -> Ite
 
 
 def kept_rows(name: str, file: Path) -> list[Row]:
-    """All results in the file that this version of the program made. Raises SessionError as :func:`run_cells`."""
+    """All results in the file that this version of the program made. Raises ConfigurationError as :func:`run_cells`."""
     return list(_known_rows(name, file, keep=False)[0].values())
 
 
 def _rows_of_another_machine(name: str, file: Path) -> dict[str, Row]:
     if not file.is_file():
-        raise SessionError("no results here", where=str(file), hint=f"Give the folder that contains {LINES_FILE}")
+        raise ConfigurationError("no results here", where=str(file), hint=f"Give the folder that contains {LINES_FILE}")
     rows, by = _known_rows(name, file, keep=True)
     if by == SEVERAL:
         hint = "Merge results of one version only: the same commit on every machine"
-        raise SessionError("was made by another version of the program", where=str(file), hint=hint)
+        raise ConfigurationError("was made by another version of the program", where=str(file), hint=hint)
     return rows
 
 
@@ -120,13 +121,13 @@ def _known_rows(name: str, file: Path, keep: bool) -> tuple[dict[str, Row], str]
         head, *lines = file.read_text(encoding="utf-8").splitlines()
         found = json.loads(head)
         if found["format"] != FORMAT or found["experiment"] != name:
-            raise SessionError(
+            raise ConfigurationError(
                 f"contains results of {found['experiment']}", where=str(file), hint="Choose another --out"
             )
         rows = [Row.from_json(json.loads(line)) for line in _whole(lines)]
     except (OSError, ValueError, KeyError, TypeError) as error:
         hint = "Remove the file to start again, or choose another --out"
-        raise SessionError("is not a results file", where=str(file), hint=hint) from error
+        raise ConfigurationError("is not a results file", where=str(file), hint=hint) from error
     same = found["version"] == version()
     if not (same or keep):
         return {}, version()

@@ -14,7 +14,7 @@ import numpy as np
 import trimesh
 
 from drivers.core.contacts import Array
-from drivers.core.errors import ShapeError
+from drivers.core.errors import SessionDataError, given_by_a_person
 from drivers.simulation.mesh_object import convex_pieces
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 
@@ -121,7 +121,8 @@ def make_model(
         friction: Coulomb's.
 
     Raises:
-        ShapeError: there is no such file, or it holds no closed surface with its standard deviation.
+        SessionDataError: there is no such file.
+        ConfigurationError: it holds no closed surface with its standard deviation.
     """
     surface, sigma_m = _read_surface(mesh_file)
     lowered_m = -float(surface.vertices[:, 2].min())
@@ -141,8 +142,9 @@ def make_model(
 def _read_surface(path: Path) -> tuple[trimesh.Trimesh, Array]:
     if not path.is_file():
         hint = "Too few contacts enclose nothing: touch the object more often"
-        raise ShapeError("there is no estimated surface", where=str(path), hint=hint)
-    found = read_estimated_mesh(path)
+        raise SessionDataError("there is no estimated surface", where=str(path), hint=hint)
+    with given_by_a_person():
+        found = read_estimated_mesh(path)
     return found.mesh, found.sigma_m
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from drivers.core.clock import NANOSECONDS
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.traffic.reader import TrafficMessage, may_hold
 from sessions.recording.traffic.schemas import DECISION_TOPIC, SAFETY_TOPIC
@@ -97,7 +97,7 @@ def _read(message: TrafficMessage, path: Path, form: Callable[[dict[str, Any], i
     try:
         return form(json.loads(message.data), message.stamp_ns)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-        raise SessionError(
+        raise SessionDataError(
             f"a message on {message.topic} has an unexpected format ({error!r})", where=str(path)
         ) from error
 

@@ -16,7 +16,7 @@ from typing import Literal, Self
 import viser
 from viser import _messages
 
-from drivers.core.errors import DeviceError
+from drivers.core.errors import DeviceError, refusal
 from sessions.guided.operator import Ask
 from tactile_lab.view.certificates import load_certificate
 from tactile_lab.view.controls import Controls
@@ -30,6 +30,7 @@ from tactile_lab.view.wizard_panel import WizardPanel
 Say = Callable[..., None]
 """Reports a pressed button by keywords: ask and text, or question and answer."""
 
+_FREE = "Choose another --view-port (0: any free one), or an address of this computer"
 _WHOLE_TABLE = 3.0
 """Camera distance for a wizard, whose hand also presses the edges of the table."""
 
@@ -89,7 +90,7 @@ class Page:
             server = opened.result(10)
         except (OSError, TimeoutError) as error:
             self.close()
-            raise DeviceError(f"cannot listen on port {port} ({error})", where=address) from error
+            raise DeviceError(f"cannot listen on port {port} ({refusal(error)})", where=address, hint=_FREE) from error
         self._server = server
         bound = server.sockets[0].getsockname()[1]
         name = socket.gethostname() if _is_every(address) else address

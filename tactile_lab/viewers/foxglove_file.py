@@ -26,7 +26,8 @@ def write_foxglove(path: Path, items: RecordedItems, facts: Mapping[str, str]) -
         facts: about the session, stored as metadata.
 
     Raises:
-        SessionError: the file exists or cannot be written.
+        ConfigurationError: the file exists.
+        WriteError: it cannot be written.
     """
     with new_file(path) as partial, partial.open("wb") as file:
         return _McapFile(Writer(file), items.robot, facts).write(foxglove_messages(items))

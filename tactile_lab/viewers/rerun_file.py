@@ -27,7 +27,8 @@ def write_rerun(path: Path, items: RecordedItems, name: str) -> int:
         name: of the recording in the viewer.
 
     Raises:
-        SessionError: the file exists or cannot be written.
+        ConfigurationError: the file exists.
+        WriteError: it cannot be written.
     """
     with new_file(path) as partial:
         partial.touch()  # what cannot be written is told before anything is computed

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, WriteError
 from drivers.core.installed.extras import require_package
 from drivers.shadow.model.kinematics import JOINTS
 from sessions.exchange.sample_tables import SampleTables
@@ -32,15 +32,15 @@ def write_ros_bag(folder: Path, robot: Robot, items: Iterable[Item], tables: Sam
         tables: all samples: joints and wrenches at full rate, and data without a type of ROS as JSON in a ``String``.
 
     Raises:
-        ConfigurationError: rosbags is not installed.
-        SessionError: the folder exists or cannot be written.
+        ConfigurationError: rosbags is not installed, or the folder exists.
+        WriteError: the folder cannot be written.
     """
     require_package("rosbags")
     from rosbags.rosbag2 import WriterError
     from rosbags.typesys import Stores, get_typestore
 
     if folder.exists():
-        raise SessionError("exists already", where=str(folder), hint="Choose a new folder")
+        raise ConfigurationError("exists already", where=str(folder), hint="Choose a new folder")
     store = get_typestore(Stores.ROS2_JAZZY)
     make = RosMessages(store.types, robot)
     partial = folder.with_name(f".{folder.name}.part")  # the files inside are named after the bag's own folder
@@ -49,7 +49,7 @@ def write_ros_bag(folder: Path, robot: Robot, items: Iterable[Item], tables: Sam
         count = _write(partial / folder.name, store, _in_order(make, robot, items, tables))
         (partial / folder.name).replace(folder)
     except (OSError, WriterError) as error:
-        raise SessionError(f"cannot be written ({error})", where=str(folder), hint="Choose a new folder") from error
+        raise WriteError(f"cannot be written ({error})", where=str(folder), hint="Choose a new folder") from error
     finally:
         shutil.rmtree(partial, ignore_errors=True)
     return count

@@ -14,7 +14,7 @@ import numpy as np
 from drivers.core.atomic_files import write_whole
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError, SessionDataError
 from sessions.recording.session import TRAJECTORY, Session
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, TRANSFORMS_TOPIC
@@ -95,7 +95,7 @@ def result_folders(session: Session, names: Sequence[str]) -> list[Path]:
     if not names:
         found = sorted(path.parent for path in session.folder.glob(f"*/{TRAJECTORY}"))
         if not found:
-            raise SessionError(
+            raise SessionDataError(
                 "contains no results", where=str(session.folder), hint="Replay the session to create them"
             )
         return found
@@ -107,7 +107,7 @@ def _folder(session: Session, name: str) -> Path:
         if (path / TRAJECTORY).is_file():
             return path
     hint = "Give results folders inside the session, or their paths"
-    raise SessionError(f"has no results called {name!r}", where=str(session.folder), hint=hint)
+    raise SessionDataError(f"has no results called {name!r}", where=str(session.folder), hint=hint)
 
 
 def write_comparison(comparison: Comparison, out: Path) -> list[Path]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Contact
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 from drivers.core.installed.extras import require_package
 from sessions.exchange.archives import export_archive
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
@@ -64,7 +64,7 @@ def export_contacts(session: Session, path: Path, dimension: int | None = None) 
     grasps = tuple(kept_grasps(replay.outcomes()))
     contacts = [contact for grasp in grasps for contact in grasp.contacts]
     if not contacts:
-        raise SessionError("no grasp with a contact was recorded", where=str(session.folder))
+        raise SessionDataError("no grasp with a contact was recorded", where=str(session.folder))
     log = ContactLog(
         dimension=_dimension(dimension or settings.dimension),
         point_sigma_m=_common_point_sigma_m(contacts),
@@ -104,7 +104,7 @@ def _bytes(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise SessionError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the file") from error
+        raise SessionDataError(f"cannot be read ({error.strerror})", where=str(path), hint="Check the file") from error
 
 
 def export_csv(session: Session, folder: Path) -> int:
@@ -189,7 +189,7 @@ def export_tum(session: Session, folder: Path) -> int:
     truth = read_trajectory(truth_file).world_T_object if truth_file.is_file() else (None,) * len(stamps_s)
     if len(truth) != len(stamps_s):
         hint = "Evaluate the session again"
-        raise SessionError(f"has {len(truth)} poses instead of {len(stamps_s)}", where=str(truth_file), hint=hint)
+        raise SessionDataError(f"has {len(truth)} poses instead of {len(stamps_s)}", where=str(truth_file), hint=hint)
     if any(pose is not None for pose in truth):
         texts = {
             "estimate.tum": tum_text(stamps_s, aligned_poses(estimate, truth)),

@@ -12,6 +12,7 @@ import trimesh
 from drivers.core.configuration import load, validate
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError, TactileLabError, given_by_a_person
+from drivers.core.reading.bounded_files import refuse_unreachable
 from sessions.conductor.progress import NullProgress, Progress
 from sessions.exchange.contact_log import ContactLog, read_contact_log
 from sessions.recording.listing import find_session
@@ -92,6 +93,7 @@ def reconstruct(
     if path.suffix.lower() == ".csv":
         hint = f"To convert timed contacts: tactile-lab session import {source}"
         raise ConfigurationError("is a table, not a contact log", where=source, hint=hint)
+    refuse_unreachable(path)
     if path.is_file() or path.suffix == ".json":
         return reconstruct_log(path, wishes, out, progress)
     session = find_session(root, source)

@@ -11,7 +11,7 @@ from mcap.writer import Writer
 EVERY = ("session show", "session replay", "evaluate", "report")
 
 
-def refused(answer, *words: str, code: int = 1) -> None:
+def refused(answer, *words: str, code: int = 2) -> None:
     assert (answer.code, answer.out) == (code, ""), answer
     errors = [line for line in answer.err.splitlines() if line.startswith("error: ")]
     assert len(errors) == 1, answer.err
@@ -30,7 +30,7 @@ def foreign_mcap(path) -> None:
 
 @pytest.mark.parametrize("command", EVERY)
 def test_a_folder_that_is_no_session(inside, tmp_path, command):
-    refused(inside(*command.split(), tmp_path), "not a session folder", code=2)
+    refused(inside(*command.split(), tmp_path), "not a session folder")
 
 
 @pytest.mark.parametrize("share", [0.95, 0.6])
@@ -149,7 +149,7 @@ def test_results_replaced_by_a_file(inside, session_copy):
     shutil.rmtree(session_copy / "results")
     (session_copy / "results").write_text("in the way")
     for command in ("evaluate", "session replay"):
-        refused(inside(*command.split(), session_copy), "results", "Move the file that is in its place")
+        refused(inside(*command.split(), session_copy), "results", "Move the file that is in its place", code=1)
 
 
 def test_results_that_can_not_be_read(inside, session_copy):

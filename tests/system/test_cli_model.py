@@ -40,6 +40,6 @@ def test_an_unknown_format_is_refused_with_those_there_are(inside, recorded, tmp
 def test_a_session_without_a_shape_says_so(inside, session_copy, tmp_path):
     (session_copy / "results" / "mesh.ply").unlink()
     answer = inside("model", "export", session_copy, "--out", tmp_path / "box")
-    assert answer.code == 1
+    assert answer.code == 2
     assert "there is no estimated surface" in answer.err
     assert not (tmp_path / "box").exists()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -161,6 +162,27 @@ def test_what_does_not_exist_is_told_before_anything_is_begun(inside, words, tol
     assert told in answer.err
     assert "Value error" not in answer.err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("session", "show", 300 * "a"),
+        ("session", "list", "--root", 300 * "a"),
+        ("session", "export", "none", "--csv", "loop/csv"),
+        ("reconstruct", 300 * "a"),
+        ("run", "--object", f"mesh:{300 * 'a'}"),
+        ("evaluate", "none", "--lens", "loop"),
+        ("calibrate", "show", "loop/x.yaml"),
+    ],
+)
+def test_a_path_that_the_system_refuses_is_told_in_words(inside, words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop").symlink_to("loop")
+    answer = inside(*words)
+    assert (answer.code, answer.out) == (2, "")
+    assert re.search(r"cannot be used \((File name too long|Too many levels of symbolic links)\)", answer.err)
+    assert len(answer.err) < 400
 
 
 def test_an_export_refuses_what_exists_before_it_reads_anything(inside, tmp_path):

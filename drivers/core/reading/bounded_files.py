@@ -17,6 +17,7 @@ LARGEST_JSON_bytes = 16 * MB
 """A contact log of 8000 grasps; a document of nothing but brackets takes twenty times as much in memory."""
 LARGEST_MESH_bytes = 64 * MB
 """A binary mesh of more than a million triangles."""
+_SHOWN = 200
 
 
 def read_bounded(path: Path, most_bytes: int) -> bytes:
@@ -36,6 +37,22 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
     if len(content) > most_bytes:  # it has grown
         raise _too_large(path, len(content), most_bytes)
     return content
+
+
+def refuse_unreachable(path: Path) -> None:
+    """Before anything is asked about a path: whether there is something can be found out, and need not be so.
+
+    Raises:
+        ConfigurationError: a folder on the way may not be entered, the name is too long, or a link leads to itself.
+    """
+    try:
+        path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    except OSError as error:
+        shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}..."
+        hint = "Check the path and its permissions"
+        raise ConfigurationError(f"cannot be used ({error.strerror})", where=shown, hint=hint) from error
 
 
 def check_size(path: Path, most_bytes: int) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 from sessions.recording.traffic import raw_frames, schemas
 
 TRAFFIC_FORMATS = ("tactile-traffic/1", "tactile-traffic/2")
@@ -80,7 +80,7 @@ def _steps(written_in: Any, known: tuple[str, ...], where: str) -> tuple[str, ..
         return known[known.index(written_in) : -1]
     newer = _number(written_in) > _number(known[-1]) and str(written_in).startswith(known[-1].split("/")[0])
     what = "a newer version of the program" if newer else "a format that this program does not know"
-    raise SessionError(
+    raise SessionDataError(
         f"written in {written_in!r}, {what}; this version reads {known[0]} to {known[-1]}",
         where=where,
         hint="Use the version of tactile-lab that recorded it" + (", or a newer one" if newer else ""),

@@ -28,7 +28,7 @@ from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message, MessageIndex, Metadata
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 from sessions.recording.traffic import formats, raw_frames, schemas
 from sessions.recording.traffic.files import END_RECORD, PROFILE, SEAL, is_sealed, segment_path
 from sessions.recording.traffic.mcap_chunks import split_chunk
@@ -168,7 +168,7 @@ class TrafficReader:
                     try:
                         yield Attachment.read(ReadDataStream(BytesIO(content)))
                     except _UNREADABLE as error:
-                        raise SessionError(f"an attachment is damaged ({error})", where=str(self.path)) from error
+                        raise SessionDataError(f"an attachment is damaged ({error})", where=str(self.path)) from error
 
     def _as_now(self, topic: str, message: Message) -> TrafficMessage:
         """A message in the present format, without its envelope."""
@@ -178,7 +178,7 @@ class TrafficReader:
         try:
             payload, device = raw_frames.decode(data)
         except ValueError as error:
-            raise SessionError(f"a message of {topic} cannot be read ({error})", where=str(self.path)) from error
+            raise SessionDataError(f"a message of {topic} cannot be read ({error})", where=str(self.path)) from error
         return TrafficMessage(topic, payload, stamp_ns, message.sequence, device)
 
     def _read_preamble(self, path: Path) -> Callable[[formats.Message], formats.Message]:
@@ -199,7 +199,9 @@ class TrafficReader:
                         found = Metadata.read(ReadDataStream(BytesIO(content)))
                         notes += [found.metadata] if found.name == PROFILE else []
             if frames.damaged_magic and not (notes or profile == PROFILE):
-                raise SessionError("not an MCAP file", where=str(path), hint="Restore it from a copy of the session")
+                raise SessionDataError(
+                    "not an MCAP file", where=str(path), hint="Restore it from a copy of the session"
+                )
         if not notes:
             if profile is not None:
                 self._check_profile(profile)
@@ -211,7 +213,7 @@ class TrafficReader:
 
     def _check_profile(self, profile: str) -> None:
         if profile != PROFILE:
-            raise SessionError(
+            raise SessionDataError(
                 f"an MCAP file, but not one of a session (its profile is {profile!r}, not {PROFILE!r})",
                 where=str(self.path),
                 hint="Restore the session's own traffic.mcap",
@@ -306,7 +308,7 @@ def _open(path: Path) -> BinaryIO:
     try:
         return path.open("rb")
     except OSError as error:
-        raise SessionError(
+        raise SessionDataError(
             f"cannot be opened ({error.strerror})", where=str(path), hint="Check the session folder"
         ) from error
 

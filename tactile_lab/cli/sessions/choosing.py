@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from sessions.recording.session import Session
 
-_LAST = "last"
-
 
 def resolve_name(root: Path, name: str) -> str:
     """The session that a name means: ``last`` becomes its folder, and people are told which one that is.
@@ -17,7 +15,9 @@ def resolve_name(root: Path, name: str) -> str:
     Raises:
         ConfigurationError: there is no last one.
     """
-    if name != _LAST:
+    from sessions.recording.session_ids import LAST
+
+    if name != LAST:
         return name
     from sessions.recording.listing import session_folder
     from tactile_lab.cli.console import say

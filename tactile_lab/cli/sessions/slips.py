@@ -34,7 +34,7 @@ def slips(
 
     A slip is the object's motion between two grasps relative to the hand's motion.
     """
-    from drivers.core.errors import SessionError
+    from drivers.core.errors import SessionDataError
     from tactile_lab.cli.console import emit_json
     from tactile_lab.evaluation.slips import Slips
 
@@ -43,7 +43,7 @@ def slips(
     told = [name for name, found in measured.items() if len(found.carried) + len(found.left)]
     if not told:
         hint = "Slips need a marker camera that sees the object at two grasps in a row"
-        raise SessionError("slips cannot be measured in any of the sessions", where=str(root), hint=hint)
+        raise SessionDataError("slips cannot be measured in any of the sessions", where=str(root), hint=hint)
     found = Slips.join(measured.values())
     if as_json:
         emit_json(_document(found, told))
@@ -53,7 +53,7 @@ def slips(
 
 def _choose_sessions(root: Path, names: list[str] | None) -> list[Session]:
     """The given sessions, or all closed ones; of one rig."""
-    from drivers.core.errors import ConfigurationError, SessionError
+    from drivers.core.errors import ConfigurationError
     from sessions.recording.listing import list_sessions
     from sessions.recording.session import Session
 
@@ -62,7 +62,7 @@ def _choose_sessions(root: Path, names: list[str] | None) -> list[Session]:
     else:
         found = [Session.open(each.folder) for each in list_sessions(root) if each.status == "closed"]
     if not found:
-        raise SessionError("contains no closed session", where=str(root), hint="Record one with: tactile-lab run")
+        raise ConfigurationError("contains no closed session", where=str(root), hint="Record one with: tactile-lab run")
     rigs = sorted({session.manifest.rig for session in found})
     if len(rigs) > 1:
         hint = "Give sessions of one rig, or keep each rig's sessions in a separate folder (--root)"

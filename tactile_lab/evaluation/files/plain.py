@@ -14,7 +14,7 @@ import numpy as np
 from gtsam import Pose2, Pose3
 from pydantic import BaseModel
 
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError, SessionDataError
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.core.reading.json_text import parse_json
 
@@ -69,9 +69,9 @@ def read_json_object(path: Path, *, hint: str) -> dict[str, Any]:
     try:
         content = parse_json(read_bounded(path, LARGEST_JSON_bytes))
     except FileNotFoundError as error:
-        raise SessionError("file not found", where=str(path), hint=hint) from error
+        raise SessionDataError("file not found", where=str(path), hint=hint) from error
     except (OSError, ConfigurationError, ValueError, RecursionError) as error:
-        raise SessionError(f"is not readable JSON ({error})", where=str(path), hint=hint) from error
+        raise SessionDataError(f"is not readable JSON ({error})", where=str(path), hint=hint) from error
     if not isinstance(content, dict):
-        raise SessionError("does not contain a JSON object", where=str(path), hint=hint)
+        raise SessionDataError("does not contain a JSON object", where=str(path), hint=hint)
     return content

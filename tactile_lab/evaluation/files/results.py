@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from drivers.core.contacts import Array
-from drivers.core.errors import SessionError
+from drivers.core.errors import SessionDataError
 from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.tables import RERUN, ContactRows, read_contacts
 from tactile_lab.evaluation.files.trajectory_file import Trajectory, read_trajectory
@@ -61,7 +61,7 @@ def read_results(folder: Path) -> Results:
     slam = read_json_object(folder / "slam.json", hint=RERUN)
     missing = [key for key in ("method", "seed", "dimension", "status", "steps", "loops") if key not in slam]
     if missing:
-        raise SessionError(f"lacks {', '.join(missing)}", where=str(folder / "slam.json"), hint=RERUN)
+        raise SessionDataError(f"lacks {', '.join(missing)}", where=str(folder / "slam.json"), hint=RERUN)
     contacts = read_contacts(folder / "contacts.csv", len(trajectory.stamps_s))
     timing = read_json_object(folder / "timing.json", hint=RERUN)
     return Results(trajectory, contacts, slam, tuple(map(float, timing.get("step_seconds", ()))))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.core.contacts import Array, Grasp
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError, SessionDataError
 from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 NANOSECOND_s = 1e-9
@@ -84,7 +84,7 @@ def read_contacts(path: Path, grasp_count: int) -> tuple[ContactRows, ...]:
                 raise ValueError(f"no such finger or grasp: {finger}, {index}")
             grasps[index].append([finger, *map(str, map(float, row[3:]))])
         except ValueError as error:
-            raise SessionError(f"line {number}: {error}", where=str(path), hint=RERUN) from error
+            raise SessionDataError(f"line {number}: {error}", where=str(path), hint=RERUN) from error
     return tuple(map(_contact_rows, grasps))
 
 
@@ -137,9 +137,9 @@ def read_contour(path: Path) -> ContourRows:
     try:
         table = np.array([[float(entry) for entry in row] for row in rows[:-1]])
     except ValueError as error:
-        raise SessionError(f"has an entry that is not a number ({error})", where=str(path), hint=RERUN) from error
+        raise SessionDataError(f"has an entry that is not a number ({error})", where=str(path), hint=RERUN) from error
     if len(table) < _LEAST_CORNERS or not np.isfinite(table).all():
-        raise SessionError("is not an outline of three finite points or more", where=str(path), hint=RERUN)
+        raise SessionDataError("is not an outline of three finite points or more", where=str(path), hint=RERUN)
     known = table[:, 3] != 0 if table.shape[1] > 3 else np.ones(len(table), dtype=bool)
     return ContourRows(table[:, :2], table[:, 2:3].ravel(), known)
 
@@ -149,7 +149,7 @@ def _read_csv(path: Path, *forms: Sequence[str]) -> list[list[str]]:
     try:
         rows = list(csv.reader(io.StringIO(read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8"))))
     except (OSError, ConfigurationError, UnicodeDecodeError) as error:
-        raise SessionError("cannot be read", where=str(path), hint=RERUN) from error
+        raise SessionDataError("cannot be read", where=str(path), hint=RERUN) from error
     if not rows or tuple(rows[0]) not in forms or any(len(row) != len(rows[0]) for row in rows):
-        raise SessionError(f"is not a table of {', '.join(forms[0])}", where=str(path), hint=RERUN)
+        raise SessionDataError(f"is not a table of {', '.join(forms[0])}", where=str(path), hint=RERUN)
     return rows[1:]

@@ -12,7 +12,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError, SessionDataError
 from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 
 COLUMNS = ("stamp_s", *(f"world_T_object_{row}{column}" for row in range(4) for column in range(4)))
@@ -65,16 +65,18 @@ def read_trajectory(path: Path) -> Trajectory:
     try:
         text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8")
     except (OSError, ConfigurationError, UnicodeDecodeError) as error:
-        raise SessionError(
+        raise SessionDataError(
             "trajectory cannot be read", where=str(path), hint="Replay the session to write its results"
         ) from error
     columns = tuple(text.partition("\n")[0].rstrip("\r").split(","))  # before millions of lines of something else
     if columns not in (COLUMNS, COLUMNS + COVARIANCE_COLUMNS):
-        raise SessionError(f"first line is not '{COLUMNS[0]}' and the 16 entries of world_T_object", where=str(path))
+        raise SessionDataError(
+            f"first line is not '{COLUMNS[0]}' and the 16 entries of world_T_object", where=str(path)
+        )
     try:
         _, *rows = csv.reader(io.StringIO(text))
     except csv.Error as error:
-        raise SessionError(f"is not a table ({error})", where=str(path), hint="Replay the session") from error
+        raise SessionDataError(f"is not a table ({error})", where=str(path), hint="Replay the session") from error
     places = [f"{path}, line {number}" for number in range(2, len(rows) + 2)]
     placed = [_read_row(row, len(columns), place) for row, place in zip(rows, places, strict=True)]
     covariances = tuple(covariance for _, _, covariance in placed) if len(columns) > len(COLUMNS) else ()
@@ -83,7 +85,7 @@ def read_trajectory(path: Path) -> Trajectory:
 
 def _read_row(row: list[str], count: int, where: str) -> tuple[float, Pose3 | None, Array | None]:
     if len(row) != count:
-        raise SessionError(f"has {len(row)} entries instead of {count}", where=where)
+        raise SessionDataError(f"has {len(row)} entries instead of {count}", where=where)
     try:
         stamp = float(row[0])
         if not any(row[1:]):
@@ -91,7 +93,7 @@ def _read_row(row: list[str], count: int, where: str) -> tuple[float, Pose3 | No
         matrix = np.array([float(entry) for entry in row[_MATRIX]]).reshape(4, 4)
         upper = [float(entry) for entry in row[len(COLUMNS) :]] if any(row[len(COLUMNS) :]) else None
     except ValueError as error:
-        raise SessionError(f"contains an entry that is not a number ({error})", where=where) from error
+        raise SessionDataError(f"contains an entry that is not a number ({error})", where=where) from error
     return stamp, _rigid(matrix, where), None if upper is None else _covariance(upper, where)
 
 
@@ -99,7 +101,7 @@ def _rigid(matrix: Array, where: str) -> Pose3:
     rotation = matrix[:3, :3]
     orthonormal = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-6) and np.linalg.det(rotation) > 0
     if not (np.isfinite(matrix).all() and orthonormal and np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0])):
-        raise SessionError("is not a rigid transform", where=where)
+        raise SessionDataError("is not a rigid transform", where=where)
     return Pose3(matrix)
 
 
@@ -109,5 +111,7 @@ def _covariance(upper: list[float], where: str) -> Array:
     rows, columns = np.array(_PAIRS).T
     matrix[rows, columns] = matrix[columns, rows] = upper
     if not np.isfinite(matrix).all() or (np.diag(matrix) < 0).any():
-        raise SessionError("contains a covariance with entries that are not finite, or negative variances", where=where)
+        raise SessionDataError(
+            "contains a covariance with entries that are not finite, or negative variances", where=where
+        )
     return matrix

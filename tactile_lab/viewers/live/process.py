@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from drivers.core.child_process import failure
-from drivers.core.errors import DeviceError, TactileLabError
+from drivers.core.errors import DeviceError, TactileLabError, refusal
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.viewers.camera_pose import camera_of_rig
 from tactile_lab.viewers.encoded import Encoded
@@ -76,7 +76,7 @@ async def _serve(settings: dict[str, Any]) -> None:
             reader.start()
             await ended.wait()
     except OSError as error:
-        what = f"cannot listen on {settings['address']}:{settings['port']} ({error.strerror or error})"
+        what = f"cannot listen on {settings['address']}:{settings['port']} ({refusal(error)})"
         raise DeviceError(what, where="live", hint="Choose another --live-port") from error
 
 

@@ -61,6 +61,23 @@ def test_a_recovery_stands_in_for_the_torn_session_and_not_for_a_later_one(tmp_p
     assert last(tmp_path) == later.folder
 
 
+def test_an_older_session_is_not_the_last_one_where_the_newest_cannot_be_read(tmp_path):
+    older, newest = recorded(tmp_path, 31), recorded(tmp_path, 32)
+    (newest.folder / "session.yaml").write_text("status: [")
+    with pytest.raises(ConfigurationError, match=rf"{newest.folder.name}: is the last session.*session recover"):
+        last(tmp_path)
+    older.folder.rename(tmp_path / "29991231-235959-box")
+    assert last(tmp_path).name == "29991231-235959-box"
+
+
+def test_no_session_is_called_last(tmp_path, archive):
+    with pytest.raises(ConfigurationError, match="means the newest session"):
+        import_archive(archive, tmp_path / "runs", "last")
+    recorded(tmp_path / "runs", 31).folder.rename(tmp_path / "runs" / "last")
+    with pytest.raises(ConfigurationError, match=r"is the name of a session here.*give a path"):
+        last(tmp_path / "runs")
+
+
 def test_where_nothing_was_recorded_last_names_what_there_is(tmp_path, archive):
     session = import_archive(archive, tmp_path / "runs")
     with pytest.raises(ConfigurationError, match=rf"only extracts and imports.*give a name: {session.folder.name}"):

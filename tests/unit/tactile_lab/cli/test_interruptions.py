@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -200,3 +201,16 @@ def test_exhausted_memory_is_told_in_words(monkeypatch: pytest.MonkeyPatch, caps
         main(["rig", "list"])
     assert ended.value.code == 1
     assert "the memory is exhausted" in capsys.readouterr().err
+
+
+def test_a_file_that_the_system_refuses_is_told_in_words(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refused(*arguments: object, **named: object) -> None:
+        raise PermissionError(errno.EACCES, "words of a library", "/there/it.yaml")
+
+    monkeypatch.setattr("tactile_lab.cli.app.app", refused)
+    with pytest.raises(SystemExit) as ended:
+        main(["rig", "list"])
+    assert ended.value.code == 1
+    assert "error: /there/it.yaml: cannot be used (Permission denied)." in capsys.readouterr().err
