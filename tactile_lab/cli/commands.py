@@ -59,8 +59,8 @@ def _command(name: str) -> Any:
 
 
 def _check_values(command: Any) -> None:
-    """No option of a command, or of its commands, takes nan or inf for a number, which bounds alone let through, or a
-    path of which nothing can be found out.
+    """No option of a command, or of its commands, takes nan or inf for a number, which bounds alone let through, bytes
+    that are no text, or a path of which nothing can be found out.
     """
     for parameter in command.params:
         parameter.callback = _checked(parameter.callback)
@@ -75,8 +75,19 @@ def _checked(then: Callable[..., Any] | None) -> Callable[..., Any]:
         for item in value if isinstance(value, tuple | list) else [value]:
             if isinstance(item, float) and not math.isfinite(item):
                 raise typer.BadParameter(f"must be a finite number, not {item}", ctx=ctx, param=parameter)
+            if isinstance(item, str | Path) and not _is_text(str(item)):
+                raise typer.BadParameter(f"must be text in UTF-8, not {str(item)!a}", ctx=ctx, param=parameter)
             if isinstance(item, Path):
                 refuse_unreachable(item)
         return value if then is None else then(ctx, parameter, value)
 
     return check
+
+
+def _is_text(words: str) -> bool:
+    """Whether files in UTF-8 can hold it: words of a command line may be any bytes."""
+    try:
+        words.encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -65,10 +65,14 @@ class LastingStream:
         """Write, or do nothing."""
         if self._stream is not None and self.failure is None:
             try:
-                self._stream.write(text)
+                self._stream.write(self._shown(text))
             except OSError as error:
                 self._give_up(error)
         return len(text)
+
+    def _shown(self, text: str) -> str:
+        """With escapes for characters that its encoding does not have."""
+        return text.encode(self.encoding, "backslashreplace").decode(self.encoding)
 
     def flush(self) -> None:
         """Flush, or do nothing."""

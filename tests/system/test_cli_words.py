@@ -107,6 +107,8 @@ def test_help_loads_nothing_heavy():
         ("calibrate forearm --method manual --rpy-deg 0 0 inf", "must be a finite number, not inf"),
         ("session replay last --speed nan", "--speed"),
         ("experiment ablation --seeds 0-99999999", "--seeds"),
+        ("run --notes \udcff", "must be text in UTF-8"),
+        ("session show \udcff", "must be text in UTF-8"),
     ],
 )
 def test_a_usage_error_names_the_option_and_exits_with_2(words, told, tmp_path, monkeypatch):

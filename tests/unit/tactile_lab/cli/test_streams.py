@@ -37,6 +37,13 @@ def test_a_pipe_without_a_reader_takes_whatever_is_said():
     assert lasting.failure.errno == errno.EPIPE
 
 
+def test_characters_that_a_stream_does_not_have_are_escaped():
+    narrow = io.TextIOWrapper(io.BytesIO(), encoding="ascii", write_through=True)
+    with redirect_stdout(narrow):
+        LastingStream("stdout").write("3 ± 1 \udcff")
+    assert narrow.buffer.getvalue() == rb"3 \xb1 1 \udcff"
+
+
 def test_an_answer_that_nobody_reads_is_no_error_and_one_that_cannot_be_written_is(monkeypatch):
     lasting = LastingStream("stdout")
     monkeypatch.setattr(console, "_out", lasting)

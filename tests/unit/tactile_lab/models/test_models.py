@@ -13,7 +13,7 @@ import trimesh
 import yourdfpy
 from pxr import Usd, UsdGeom, UsdPhysics
 
-from drivers.core.errors import ConfigurationError, ShapeError
+from drivers.core.errors import ConfigurationError, SessionDataError
 from tactile_lab.evaluation.files.mesh_io import write_ply
 from tactile_lab.evaluation.prism import prism
 from tactile_lab.models import usd_file
@@ -135,13 +135,13 @@ def test_usd_holds_mass_surface_and_uncertainty(folder: Path, model: SolidModel)
 
 
 def test_a_session_without_a_surface_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ShapeError, match="there is no estimated surface"):
+    with pytest.raises(SessionDataError, match="there is no estimated surface"):
         make_model(tmp_path / "mesh.ply", "angle")
 
 
 def test_a_mesh_of_another_program_is_refused(tmp_path: Path) -> None:
     trimesh.creation.box([0.05] * 3).export(tmp_path / "mesh.ply")
-    with pytest.raises(ShapeError, match="no standard deviations"):
+    with pytest.raises(ConfigurationError, match="no standard deviations"):
         make_model(tmp_path / "mesh.ply", "angle")
 
 
