@@ -20,9 +20,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from drivers.core.atomic_files import write_whole
+from drivers.core.atomic_files import disk_full, write_whole
 from drivers.core.clock import utc_text
-from drivers.core.errors import SessionDataError, SessionError, TactileLabError
+from drivers.core.errors import ConfigurationError, SessionDataError, SessionError, TactileLabError, WriteError
 from sessions.recording.deferred_interruption import interruption_deferred
 from sessions.recording.manifest import (
     MANIFEST,
@@ -244,7 +244,8 @@ def create_session(
         traffic_settings: how the recording is stored; the defaults suit a rig whose time waits for the disk.
 
     Raises:
-        SessionError: the folder cannot be created or a calibration file cannot be read.
+        ConfigurationError: the folder cannot be created.
+        SessionError: a calibration file cannot be read.
         WriteError: the folder cannot be written.
     """
     started = started or datetime.now(UTC)
@@ -277,7 +278,13 @@ def _attachments(folder: Path, manifest: Manifest) -> tuple[Attached, ...]:
 
 
 def new_folder(root: Path, name: str) -> Path:
-    """Create a folder with that name, or with a number added if it exists. Raises SessionError."""
+    """Create a folder with that name, or with a number added if it exists.
+
+    Raises:
+        ConfigurationError: no folder can be made there.
+        WriteError: the disk is full.
+        SessionError: there are too many of that name.
+    """
     try:
         root.mkdir(parents=True, exist_ok=True)
         for attempt in range(1, 1000):
@@ -289,9 +296,11 @@ def new_folder(root: Path, name: str) -> Path:
                 continue
             return folder
     except OSError as error:
-        raise SessionError(
-            f"cannot be made ({error.strerror})", where=str(root), hint="Choose another folder"
-        ) from error
+        if disk_full(error):
+            raise WriteError("the disk is full", where=str(root), hint="Free some space on it") from error
+        in_the_way = isinstance(error, (FileExistsError, NotADirectoryError))
+        what = "is not a folder" if in_the_way else f"cannot be made ({error.strerror})"
+        raise ConfigurationError(what, where=str(root), hint="Choose another folder") from error
     raise SessionError("a thousand sessions with this time exist already", where=str(root / name))
 
 

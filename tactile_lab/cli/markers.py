@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from drivers.camera.boards import AnyBoard
     from tactile_lab.workflow.printing import PrintedSheet
 
+LEAST_mm, MOST_mm = 0.1, 10_000.0
+MOST_SQUARES, MOST_MARKERS = 1000, 1_000_000
+"""Bounds of options; a kind of print and a dictionary have narrower ones."""
+
 KINDS = {
     "single": {"number", "dictionary", "side_m"},
     "grid": {"dictionary", "columns", "rows", "side_m", "gap_m"},
@@ -35,19 +39,28 @@ def markers(
             "measured check bar.",
         ),
     ],
-    number: Annotated[list[int] | None, typer.Option(help="Number (ID) of a single marker. Can be repeated.")] = None,
-    side_mm: Annotated[
-        float | None, typer.Option(help="Side length of a marker's black square (single, grid, aprilgrid).")
+    number: Annotated[
+        list[int] | None, typer.Option(min=0, max=MOST_MARKERS, help="Number (ID) of a single marker. Can be repeated.")
     ] = None,
-    columns: Annotated[int | None, typer.Option(help="Number of columns of a board.")] = None,
-    rows: Annotated[int | None, typer.Option(help="Number of rows of a board.")] = None,
+    side_mm: Annotated[
+        float | None,
+        typer.Option(
+            min=LEAST_mm, max=MOST_mm, help="Side length of a marker's black square (single, grid, aprilgrid)."
+        ),
+    ] = None,
+    columns: Annotated[int | None, typer.Option(min=1, max=MOST_SQUARES, help="Number of columns of a board.")] = None,
+    rows: Annotated[int | None, typer.Option(min=1, max=MOST_SQUARES, help="Number of rows of a board.")] = None,
     gap_mm: Annotated[
-        float | None, typer.Option(help="Gap between the markers of a grid, or the tags of an AprilGrid.")
+        float | None,
+        typer.Option(min=LEAST_mm, max=MOST_mm, help="Gap between the markers of a grid, or the tags of an AprilGrid."),
     ] = None,
     square_mm: Annotated[
-        float | None, typer.Option(help="Side length of a chessboard's or ChArUco board's squares.")
+        float | None,
+        typer.Option(min=LEAST_mm, max=MOST_mm, help="Side length of a chessboard's or ChArUco board's squares."),
     ] = None,
-    marker_mm: Annotated[float | None, typer.Option(help="Side length of a ChArUco board's markers.")] = None,
+    marker_mm: Annotated[
+        float | None, typer.Option(min=LEAST_mm, max=MOST_mm, help="Side length of a ChArUco board's markers.")
+    ] = None,
     dictionary: Annotated[
         str | None, typer.Option(help="OpenCV name of the marker dictionary, such as DICT_4X4_50.")
     ] = None,
@@ -55,7 +68,10 @@ def markers(
     paper: Annotated[str, typer.Option(help="Paper size: A4, A3, A2 or letter.")] = "A4",
     out: Annotated[Path, typer.Option(help="Folder to write the files to.")] = Path("markers"),
     measured_mm: Annotated[
-        float | None, typer.Option(help="Length of the print's check bar (nominally 100 mm), measured on the paper.")
+        float | None,
+        typer.Option(
+            min=LEAST_mm, max=MOST_mm, help="Length of the print's check bar (nominally 100 mm), measured on the paper."
+        ),
     ] = None,
     as_json: Json = False,
     no_input: Annotated[bool, typer.Option("--no-input", help="Never ask for the measured check bar.")] = False,

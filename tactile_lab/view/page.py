@@ -30,7 +30,6 @@ from tactile_lab.view.wizard_panel import WizardPanel
 Say = Callable[..., None]
 """Reports a pressed button by keywords: ask and text, or question and answer."""
 
-_FREE = "Choose another --view-port (0: any free one), or an address of this computer"
 _WHOLE_TABLE = 3.0
 """Camera distance for a wizard, whose hand also presses the edges of the table."""
 
@@ -90,7 +89,11 @@ class Page:
             server = opened.result(10)
         except (OSError, TimeoutError) as error:
             self.close()
-            raise DeviceError(f"cannot listen on port {port} ({refusal(error)})", where=address, hint=_FREE) from error
+            raise DeviceError(
+                f"cannot listen on port {port} ({refusal(error)})",
+                where=address,
+                hint="Choose another --view-port or --listen",
+            ) from error
         self._server = server
         bound = server.sockets[0].getsockname()[1]
         name = socket.gethostname() if _is_every(address) else address

@@ -31,7 +31,7 @@ class PageTransport(ProcessFeed):
         certificate: str = "",
     ) -> None:
         door = {"address": address, "port": port, "token": token, "certificate": certificate}
-        hint = "Choose another --view-port, or run without --view"
+        hint = "Or run without --view"
         settings = {"panel": panel, "title": title, **door}
         super().__init__("tactile_lab.view.process", settings, name="page", hint=hint)
 

@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import rerun as rr
 
-from drivers.core.errors import ConfigurationError
+from drivers.core.errors import ConfigurationError, refusal
 from tactile_lab.viewers.new_files import new_file
 from tactile_lab.viewers.recorded_items import RecordedItems
 from tactile_lab.viewers.rerun_log import RerunLog, blueprint
@@ -67,7 +67,7 @@ def _check_answers(address: str) -> None:
         parts = urlsplit(address.removeprefix("rerun+"))
         socket.create_connection((parts.hostname or "", parts.port or _PORT), timeout=_PATIENCE_s).close()
     except (OSError, ValueError) as error:
-        raise _unreachable(f"{address}: {error}") from error
+        raise _unreachable(f"{address}: {refusal(error) if isinstance(error, OSError) else error}") from error
 
 
 def _unreachable(why: str) -> ConfigurationError:

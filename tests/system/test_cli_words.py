@@ -107,6 +107,8 @@ def test_help_loads_nothing_heavy():
         ("calibrate forearm --method manual --rpy-deg 0 0 inf", "must be a finite number, not inf"),
         ("session replay last --speed nan", "--speed"),
         ("experiment ablation --seeds 0-99999999", "--seeds"),
+        ("markers chessboard --square-mm 1e308", "--square-mm"),
+        ("markers single --number -1", "--number"),
         ("run --notes \udcff", "must be text in UTF-8"),
         ("session show \udcff", "must be text in UTF-8"),
     ],

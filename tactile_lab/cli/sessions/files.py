@@ -29,7 +29,7 @@ def extract(
     from tactile_lab.cli.console import answer, emit_json
 
     del no_input
-    wanted = None if links is None else {link.strip() for link in links.split(",")}
+    wanted = None if links is None else {link.strip() for link in links.split(",") if link.strip()}
     counts = extract(choose_session(root, session), into, Piece(begin, end, wanted, samples, not bare))
     if as_json:
         emit_json({"session": str(into), "messages": counts})

@@ -206,7 +206,7 @@ def test_a_summary_says_what_a_list_needs(tmp_path):
 
 def test_a_root_that_can_not_be_made_is_told(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(SessionError, match="cannot be made"):
+    with pytest.raises(ConfigurationError, match="is not a folder"):
         create(tmp_path / "file" / "sessions")
 
 
