@@ -178,8 +178,8 @@ def _last_recorded(root: Path) -> Path:
         hint = f"'last' means the newest session; give a path: {root / LAST}"
         raise ConfigurationError("is the name of a session here", where=LAST, hint=hint)
     if recorded:
-        names = {item.folder.name for item in readable}
-        hidden = [item for item in found if not item.readable and recovered_id(item.folder.name) not in names]
+        known = {item.folder.name for item in readable}
+        hidden = [item for item in found if not item.readable and recovered_id(item.folder.name) not in known]
         _refuse_hidden(recorded[-1], hidden)
         return recorded[-1].folder
     if readable:
