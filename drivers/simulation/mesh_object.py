@@ -1,9 +1,9 @@
-"""Mesh files as objects of the simulated rig: checks them, and splits them into convex pieces for the physics."""
+"""Meshes as objects of the simulated rig: put on the table, and split into convex pieces for the physics."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -12,37 +12,65 @@ from scipy.spatial.transform import Rotation
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.installed.extras import require_package
-from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size, refuse_unreachable
+from drivers.simulation.mesh_file import read_mesh
 from drivers.simulation.object_names import LYING, STANDING, posed_path
-
-LARGEST_m, SMALLEST_m = 0.25, 0.01
-MOST_TRIANGLES = 100_000
-"""Finding how a finer mesh rests on the table takes minutes, and no fingertip feels the difference."""
 
 _NEARLY_CONVEX = 0.96  # a mesh that fills this share of its convex hull is represented by the hull
 _MOST_PIECES = 16
 _LEANING_rad = np.radians(15.0)  # a scan that leans by less than this is meant to stand
 _LYING_rad = np.radians(45.0)  # an object turned by more than this from standing is lying
+_TOLD_rad, _TOLD_m = np.radians(5.0), 0.001
+_MOST_CORNERS = 3000  # of a hull: each facet of a ball is a pose of its own, and thousands take minutes
+_DIRECTIONS = 500
 _SAME_POSE_rad = np.radians(5.0)  # the facets of a curved side count as one pose
 
 
+@dataclass(frozen=True)
+class RestingMesh:
+    """A mesh on the table, metres, z up, with its origin at the centre of volume.
+
+    Attributes:
+        mesh: closed, faces turned outward.
+        changes: what was done to the mesh of the file, as sentences.
+    """
+
+    mesh: trimesh.Trimesh
+    changes: tuple[str, ...]
+
+
 def load_truth_mesh(name: str) -> trimesh.Trimesh:
-    """The mesh named ``mesh:<path>`` or ``mesh:<path>@<pose>``, metres, at rest, with its origin at the centre of
-    volume.
+    """The mesh of :func:`load_resting_mesh` alone."""
+    return load_resting_mesh(name).mesh
+
+
+def load_resting_mesh(name: str) -> RestingMesh:
+    """The mesh named ``mesh:<path>`` or ``mesh:<path>@<pose>``, at rest.
 
     Without a pose it stands as in the file, rotated by a few degrees if it needs that to stand firmly. If it cannot
-    stand this way, it is laid down in its most probable resting pose. Small holes are closed and faces turned outward.
+    stand this way, it is laid down in its most probable resting pose. It may float or be sunk in its file: the table is
+    where it rests.
 
     Raises:
-        ConfigurationError: the file cannot be read, has no closed surface, is not of graspable size, or has no such
-            pose.
+        ConfigurationError: the file cannot be read, has no closed surface of one body, is not of graspable size, or has
+            no such pose.
     """
     path, pose = posed_path(name)
-    mesh = _read(path)
-    _check(mesh, str(path))
+    file = read_mesh(path)
+    mesh = file.mesh
+    lowest_m = float(mesh.bounds[0, 2])
     mesh.apply_translation(-mesh.center_mass)
-    mesh.apply_transform(_resting(mesh, pose, str(path)))
-    return mesh
+    mesh.apply_transform(turn := _resting(mesh, pose, str(path)))
+    return RestingMesh(mesh, (*file.changes, *_placed(lowest_m, float(np.arccos(np.clip(turn[2, 2], -1.0, 1.0))))))
+
+
+def _placed(lowest_m: float, turned_rad: float) -> tuple[str, ...]:
+    """What was done to set a mesh on the table; nothing about what a scan is off."""
+    if turned_rad > _TOLD_rad:
+        return (f"it was turned by {np.degrees(turned_rad):.0f} degrees, to rest on the table",)
+    if abs(lowest_m) < _TOLD_m:
+        return ()
+    way = "raised" if lowest_m < 0 else "lowered"
+    return (f"it was {way} by {1e3 * abs(lowest_m):.0f} mm, to stand on the table",)
 
 
 def convex_pieces(mesh: trimesh.Trimesh) -> tuple[Array, ...]:
@@ -79,7 +107,8 @@ def _decompose(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
 
 def _resting(mesh: trimesh.Trimesh, pose: str, where: str) -> Array:
     """The rotation about the origin, shape (4, 4), that puts the mesh into a stable pose, without yaw."""
-    poses, chances = trimesh.poses.compute_stable_poses(mesh, sigma=0.0, n_samples=1, threshold=0.0)
+    hull = _coarse_hull(mesh)
+    poses, chances = trimesh.poses.compute_stable_poses(hull, mesh.center_mass, sigma=0.0, n_samples=1, threshold=0.0)
     down = -poses[np.argsort(-chances, kind="stable"), 2, :3]  # in the file's axes, most probable first
     upright = -down[:, 2]
     stands = down[upright.argmax() if upright.max() > np.cos(_LEANING_rad) else 0]
@@ -88,6 +117,20 @@ def _resting(mesh: trimesh.Trimesh, pose: str, where: str) -> Array:
     matrix = np.eye(4)
     matrix[:3, :3] = rotation.as_matrix()
     return matrix
+
+
+def _coarse_hull(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """The convex hull; of a finely curved one only as many corners as lie farthest in evenly spread directions."""
+    hull: trimesh.Trimesh = mesh.convex_hull
+    if len(hull.vertices) <= _MOST_CORNERS:
+        return hull
+    number = np.arange(_DIRECTIONS) + 0.5
+    z, turn = 1 - 2 * number / _DIRECTIONS, np.pi * (1 + np.sqrt(5)) * number
+    ways = np.column_stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z])
+    coarse: trimesh.Trimesh = trimesh.Trimesh(
+        hull.vertices[np.unique(np.argmax(ways @ hull.vertices.T, 1))]
+    ).convex_hull
+    return coarse
 
 
 def _laid(down: Array, stands: Array, pose: str, where: str) -> Array:
@@ -103,56 +146,3 @@ def _laid(down: Array, stands: Array, pose: str, where: str) -> Array:
             f"has no pose {pose}: it rests in {len(distinct)} poses", where=where, hint="Give another --pose"
         )
     return found[0]
-
-
-def _read(path: Path) -> trimesh.Trimesh:
-    refuse_unreachable(path)
-    if not path.is_file():
-        raise ConfigurationError("file not found", where=str(path), hint="Check the path of the mesh")
-    check_size(path, LARGEST_MESH_bytes)
-    try:
-        mesh = trimesh.load(path, force="mesh")
-    except Exception as error:  # the readers of a dozen formats raise all kinds of exceptions
-        raise ConfigurationError(
-            f"cannot be read as a mesh ({error})", where=str(path), hint="Give a PLY, STL, OBJ or GLB file"
-        ) from error
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        raise ConfigurationError("contains no triangles", where=str(path), hint="Export the object as a triangle mesh")
-    if len(mesh.faces) > MOST_TRIANGLES:
-        what = f"has {len(mesh.faces):,} triangles, and at most {MOST_TRIANGLES:,} are used"
-        raise ConfigurationError(what, where=str(path), hint="Simplify it in a mesh editor")
-    return mesh
-
-
-def _check(mesh: trimesh.Trimesh, where: str) -> None:
-    if not np.all(np.isfinite(mesh.vertices)):
-        raise ConfigurationError("has vertices that are not numbers", where=where, hint="Export the mesh again")
-    largest = float(mesh.extents.max())
-    if largest > LARGEST_m:
-        raise ConfigurationError(
-            f"is {largest:.3g} m long, but at most {LARGEST_m} m fit the hand's workspace",
-            where=where,
-            hint="The unit must be the metre: is the mesh in millimetres?",
-        )
-    if largest < SMALLEST_m:
-        raise ConfigurationError(
-            f"is only {largest * 1e3:.3g} mm long, but the fingertips need {SMALLEST_m * 1e3:.0f} mm to hold it",
-            where=where,
-            hint="The unit must be the metre: was the mesh scaled from millimetres twice?",
-        )
-    _repair(mesh)
-    if not mesh.is_watertight or mesh.volume <= 0:
-        _, uses = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
-        open_edges = int(np.count_nonzero(uses == 1))
-        what = f"is not a closed surface: {open_edges} edges are open, and filling small holes did not close it"
-        raise ConfigurationError(what, where=where, hint="Repair it in a mesh editor")
-
-
-def _repair(mesh: trimesh.Trimesh) -> None:
-    """Close small holes and turn faces outward, in place, where the mesh needs it."""
-    if mesh.is_watertight and mesh.volume > 0:
-        return
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
-    trimesh.repair.fill_holes(mesh)
-    mesh.fix_normals()

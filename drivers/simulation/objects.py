@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.simulation.mesh_object import convex_pieces, load_truth_mesh
+from drivers.simulation.mesh_object import convex_pieces, load_resting_mesh
 from drivers.simulation.object_names import MESH_PREFIX
 
 _CURVE_SEGMENTS = 64  # chord error 0.06 mm on the largest curve
@@ -30,6 +30,8 @@ QUIET_ZONE = 7 / 6
 """Ratio of the printed square to the black one: half a module of white on every side."""
 
 _SMALLEST_MARKER_m = 0.012
+_INWARD = 0.999
+"""Of the largest that fits: what is nearer to the middle may be so much smaller."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ class ObjectModel:
         marker: the marker on the underside.
         rolls: whether the object can roll, so that the contact model needs rolling friction.
         scanned: whether the underside is as uneven as a scan, so that the physics must settle it into its resting pose.
+        changes: what was done to the mesh of a file, as sentences.
     """
 
     name: str
@@ -92,6 +95,7 @@ class ObjectModel:
     marker: UndersideMarker
     rolls: bool = False
     scanned: bool = False
+    changes: tuple[str, ...] = ()
 
     @property
     def height_m(self) -> float:
@@ -120,11 +124,21 @@ def object_model(name: str) -> ObjectModel:
 
 def check_object(name: str) -> None:
     """Raises ConfigurationError unless there is an object of this name whose mesh, if any, can be used."""
+    object_height_m(name)
+
+
+def object_height_m(name: str) -> float:
+    """Height of an object in its resting pose, found without its convex pieces.
+
+    Raises:
+        ConfigurationError: there is no such object, or the mesh file cannot be used.
+    """
     if name.startswith(MESH_PREFIX):
-        load_truth_mesh(name)
-    elif name not in CATALOGUE:
+        return float(load_resting_mesh(name).mesh.extents[2])
+    if name not in CATALOGUE:
         known = ", ".join([*CATALOGUE, f"{MESH_PREFIX}<path>"])
         raise ConfigurationError(f"there is no object {name!r}", where="object", hint=f"Available objects: {known}")
+    return CATALOGUE[name](name).height_m
 
 
 def prism_mesh(outline_m: Array, height_m: float) -> trimesh.Trimesh:
@@ -206,12 +220,14 @@ def _scan(name: str) -> ObjectModel:
     """A mesh from a file: origin at the centre of volume; axes as in the file, except for the rotation that makes it
     stand.
     """
-    mesh = load_truth_mesh(name)
+    loaded = load_resting_mesh(name)
+    mesh = loaded.mesh
     pieces = tuple(Hull(vertices) for vertices in convex_pieces(mesh))
     lowest = mesh.bounds[0, 2]
     near_table = mesh.vertices[mesh.vertices[:, 2] < lowest + _FOOT_LAYER_m, :2]
     foot = _convex_outline(near_table)
-    return ObjectModel(name, pieces, mesh, foot, _largest_marker(foot, lowest), rolls=True, scanned=True)
+    marker = _largest_marker(foot, lowest)
+    return ObjectModel(name, pieces, mesh, foot, marker, rolls=True, scanned=True, changes=loaded.changes)
 
 
 def _convex_outline(points_m: Array) -> Array:
@@ -220,13 +236,29 @@ def _convex_outline(points_m: Array) -> Array:
 
 
 def _largest_marker(foot_m: Array, height_m: float) -> UndersideMarker:
-    """The largest marker that fits, with its border, into the underside's largest inscribed circle, at its centre."""
+    """The largest marker along the object's axes that fits, with its border, into the underside, as near to the
+    underside's middle as it fits.
+    """
     sides = np.asarray(ConvexHull(foot_m).equations)  # inside: normal . x + offset <= 0
-    constraints = np.column_stack([sides[:, :2], np.ones(len(sides))])
+    toward_corner = np.abs(sides[:, :2]).sum(axis=1)  # of a square along the axes, per half side
+    constraints = np.column_stack([sides[:, :2], toward_corner])
     best = linprog([0, 0, -1], A_ub=constraints, b_ub=-sides[:, 2], bounds=[(None, None), (None, None), (0, None)])
-    x, y, radius = np.asarray(best.x)
-    side = float(np.clip(radius * np.sqrt(2) / QUIET_ZONE, _SMALLEST_MARKER_m, MARKER_SIDE_m))
-    return UndersideMarker(side, (float(x), float(y), float(height_m)))
+    half_m = _INWARD * min(float(np.asarray(best.x)[2]), MARKER_SIDE_m * QUIET_ZONE / 2)
+    x, y = _nearest_inside(sides, half_m * toward_corner, (foot_m.min(axis=0) + foot_m.max(axis=0)) / 2)
+    side = float(np.clip(2 * half_m / QUIET_ZONE / _INWARD, _SMALLEST_MARKER_m, MARKER_SIDE_m))
+    return UndersideMarker(side, (x, y, float(height_m)))
+
+
+def _nearest_inside(sides: Array, inward_m: Array, wanted_m: Array) -> tuple[float, float]:
+    """The place nearest to another (by the sum of both coordinates) that is so far, (n,), inside a polygon's sides."""
+    unit = np.eye(2)
+    inside = np.hstack([sides[:, :2], np.zeros((len(sides), 2))])
+    beyond = np.vstack([np.hstack([unit, -unit]), np.hstack([-unit, -unit])])  # |place - wanted| is the cost
+    bounds = [(None, None)] * 2 + [(0, None)] * 2
+    limits = np.concatenate([-sides[:, 2] - inward_m, wanted_m, -wanted_m])
+    best = linprog([0, 0, 1, 1], A_ub=np.vstack([inside, beyond]), b_ub=limits, bounds=bounds)
+    x, y, *_ = np.asarray(best.x).tolist()
+    return float(x), float(y)
 
 
 CATALOGUE: Mapping[str, Callable[[str], ObjectModel]] = {

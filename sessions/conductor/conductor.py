@@ -8,11 +8,12 @@ from __future__ import annotations
 import numpy as np
 from gtsam import Pose3
 
-from drivers.core.contacts import Grasp
+from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import TactileLabError
 from sessions.conductor.decisions import DoGrasp, End, GraspAbandonedError, Pause, SessionRoles, UndoGrasp, Veto, Wait
 from sessions.conductor.estimation import Estimation
 from sessions.conductor.estimator import Estimate, Reorientation
+from sessions.conductor.object_gone import blocked, lost, not_found
 from sessions.conductor.progress import GraspReport, NullProgress, Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.conductor.settings import ConductorSettings
@@ -48,6 +49,8 @@ class Conductor:
         self._paused = False
         self._grasps: list[Grasp] = []
         self._misses = 0
+        self._landings_m: list[Array] = []
+        """Where fingertips landed on the object since the last approach that succeeded, world, (3,) each."""
         self._number = 0
 
     # --- the session -------------------------------------------------------------------------------------------
@@ -78,7 +81,8 @@ class Conductor:
         self._tell(Level.INFO, box.in_words())
         if box.is_found or self._guard.requested:
             return None
-        return Ending.OBJECT_LOST, f"no object was found where it is expected; {box.in_words()}"
+        probing, lowest_m = self._settings.probing, self._settings.cycle.touch.lowest_m
+        return Ending.OBJECT_LOST, not_found(box, self._decisions.centre_m, probing.around_m, lowest_m)
 
     def _grasp_until_done(self) -> tuple[Ending, str]:
         if ended := self._feel_bounding_box():
@@ -146,11 +150,11 @@ class Conductor:
         if len(self._grasps) >= self._settings.grasps:
             return Ending.COMPLETE, f"{len(self._grasps)} grasps done"
         if self._misses >= self._settings.missed_approaches:
-            return Ending.OBJECT_LOST, f"could not reach the table: {self._misses} approaches were blocked"
+            return Ending.OBJECT_LOST, blocked(self._misses, self._landings_m)
         if reason := self._supervisor.time_over(self._runtime.clock.now_ns()):
             return Ending.LIMIT, reason
         if reason := self._supervisor.object_lost(*self._decisions.centre_m):
-            return Ending.OBJECT_LOST, reason
+            return Ending.OBJECT_LOST, lost(reason, self._grasps)
         return None
 
     def _end(self, ending: Ending, reason: str, error: TactileLabError | None = None) -> SessionOutcome:
@@ -232,6 +236,7 @@ class Conductor:
         arrived = self._cycle.descend(plan)
         self._decisions.on_arrival(self._cycle.landings_world_m)
         self._misses = 0 if arrived else self._misses + 1
+        self._landings_m = [] if arrived else [*self._landings_m, *self._cycle.landings_world_m]
         if not arrived:
             landings = len(self._cycle.landings_world_m)
             self._tell(Level.WARNING, f"the hand landed on the object {landings} times: trying another grasp")

@@ -64,7 +64,7 @@ class CycleSettings(StrictModel):
         clearance_m: how far the hand stays above the tallest thing on the table while it travels.
         standoff_m: how far before a grasp from the side the hand comes down.
         descent_m_s: speed of the guarded descent, as far as the object's top.
-        landing_m_s: and beside it.
+        landing_m_s: and beside it; on a thumb, stiff in that direction, 35 mm/s end with 1.6 N.
         beside_m_s: the same where nothing is expected below.
         approach_m_s: speed of the guarded approach from the side.
         landing_force_N: a fingertip force during the descent that means the object is under it.
@@ -96,7 +96,7 @@ class CycleSettings(StrictModel):
     clearance_m: float = Field(default=0.03, ge=0.0)
     standoff_m: float = Field(default=0.13, gt=0.0)
     descent_m_s: float = Field(default=0.05, gt=0.0)
-    landing_m_s: float = Field(default=0.035, gt=0.0)
+    landing_m_s: float = Field(default=0.018, gt=0.0)
     beside_m_s: float = Field(default=0.08, gt=0.0)
     approach_m_s: float = Field(default=0.05, gt=0.0)
     landing_force_N: float = Field(default=0.25, gt=0.0)

@@ -135,7 +135,8 @@ class Toucher:
             below_top_m: no farther down than this below the tallest thing that is known, and never onto the table.
 
         Returns:
-            Where fingertips touched something, shape (n, 3), world frame.
+            Where fingertips touched something, shape (n, 3), world frame: their contacts, which on a rim are higher
+            than the fingertips reach down; without any, the fingertips' foremost places.
         """
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._hand), self._motion
         self._poise(table, TAP, frame)
@@ -145,13 +146,15 @@ class Toucher:
         motion.runtime.begin_closing()
         found = np.empty((0, 3))
         near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, lowest_m))
+        known = len(motion.runtime.perception.probed)
         if self._approach(near, self._cycle.descent_m_s) or self._approach(lowest, s.tap_m_s, is_careful=True):
             motion.supervisor.on_approach()
             self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m)
             found = self._landing_points(_DOWN, frame)
         self.capture()
         motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
-        return found
+        contacts = motion.runtime.perception.probed[known:]
+        return np.array([contact.point_world_m for contact in contacts]) if contacts else found
 
     def touch_side(
         self, frame: GraspFrame, side: str, from_m: float, height_m: float | None = None, all_up_to_m: float = 0.0

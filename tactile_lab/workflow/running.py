@@ -12,13 +12,14 @@ from calibration.store.admission import UNCALIBRATED, admit
 from drivers.core.configuration import validate
 from drivers.core.errors import ConfigurationError, EstimationError, InterruptionError
 from drivers.simulation.object_names import MESH_PREFIX
-from drivers.simulation.objects import ObjectModel, check_object
+from drivers.simulation.objects import ObjectModel
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.recording.manifest import Status
 from sessions.recording.recorder import Level
 from sessions.recording.session import RunningSession, create_session
+from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
@@ -29,6 +30,7 @@ from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.workflow.attending import Attendance, roles_for, settings_for
 from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, finish
+from tactile_lab.workflow.object_check import check_fits, marker_problem
 from tactile_lab.workflow.plugging import RECORD, refused_plugins, used_plugins
 
 ALONE = Attendance()
@@ -89,7 +91,7 @@ def check_request(request: SessionRequest) -> Rig:
         make_policy(request.policy)
     rig = load_rig(request.rig)
     if rig.description.kind == "simulated" or rig.description.emulated or request.object_name.startswith(MESH_PREFIX):
-        check_object(request.object_name)
+        check_fits(rig, request.object_name)
     return rig
 
 
@@ -161,11 +163,11 @@ def _record(
         roles = roles_for(attendance, runtime, slam, settings, session.folder, seed=seed, dimension=dimension)
         with roles.estimator:
             runtime.connect()
-            for refused in refused_plugins():
-                runtime.log(Level.WARNING, "plug-ins", refused)
-                progress.on_message(refused)
             record_camera(rig, session.recorder, runtime.clock.now_ns())
             try:
+                for source, remark in _remarks(runtime, rig, laboratory):
+                    runtime.log(Level.WARNING, source, remark)
+                    progress.on_message(remark)
                 outcome = Conductor(runtime, settings, roles, progress).run()
             finally:
                 runtime.close()
@@ -174,6 +176,15 @@ def _record(
             progress.on_message(remark)
         _close(session, outcome, runtime.counts.overruns, runtime.losses)
     return outcome
+
+
+def _remarks(runtime: RigRuntime, rig: Rig, laboratory: Laboratory) -> Iterator[tuple[str, str]]:
+    """What a person should know before the first grasp, and about what."""
+    yield from (("plug-ins", refused) for refused in refused_plugins())
+    if laboratory.target is not None:
+        yield from (("object", f"the mesh of the object: {change}") for change in laboratory.target.changes)
+    if problem := marker_problem(runtime, rig, laboratory.markers):
+        yield "camera", problem
 
 
 def _new_session(

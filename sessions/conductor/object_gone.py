@@ -1,0 +1,71 @@
+"""Why a session cannot go on with its object, for people: what was measured, and what to change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from drivers.core.contacts import Array, Grasp
+from sessions.motion.bounding_box import BoundingBox
+
+OPENING_m = 0.105
+"""Between parallel sides that thumb and fingers still straddle."""
+
+_STEADY = "If it rolled, fell over or was pushed away, put it back and steady it: putty under its foot, or more weight"
+
+
+def not_found(box: BoundingBox, expected_m: Array, around_m: float, lowest_m: float) -> str:
+    """Nothing was met before the first grasp.
+
+    Args:
+        box: as far as it was felt.
+        expected_m: where the object was looked for first, world x, y.
+        around_m: how far from there the last taps were.
+        lowest_m: height of the fingertips at the end of a tap.
+    """
+    return (
+        f"no object was found where it is expected; {box.in_words()} at {_place(expected_m)} and "
+        f"{1e3 * around_m:.0f} mm around, down to {1e3 * lowest_m:.0f} mm above the table. Put the object there, or "
+        "give its place in the rig file (conductor.plan.start_m); what is lower or thinner than a fingertip is not felt"
+    )
+
+
+def blocked(approaches: int, landings_m: Sequence[Array]) -> str:
+    """No way down was found.
+
+    Args:
+        approaches: in a row that failed.
+        landings_m: where fingertips landed on the object, world, shape (3,) each.
+    """
+    said = f"could not reach the table: {approaches} approaches were blocked"
+    if not len(landings_m):
+        return said
+    length_mm, width_mm = 1e3 * np.ptp(np.array(landings_m), axis=0)[:2]
+    top_mm = 1e3 * max(float(place[2]) for place in landings_m)
+    return (
+        f"{said}; fingertips landed over {length_mm:.0f} x {width_mm:.0f} mm, up to {top_mm:.0f} mm above the table, "
+        f"and the hand straddles {1e3 * OPENING_m:.0f} mm. Turn the object or lay it on another side; with "
+        "--dimension 3 what is wider is touched instead"
+    )
+
+
+def lost(reason: str, grasps: Sequence[Grasp]) -> str:
+    """The object is not where it was.
+
+    Args:
+        reason: what tells that.
+        grasps: of the session, in order.
+    """
+    touched = [contact.point_world_m for grasp in grasps for contact in grasp.contacts]
+    last = next((grasp for grasp in reversed(grasps) if grasp.contacts), None)
+    if last is None:
+        return f"{reason}; nothing was touched. Put the object where the hand closes, or give its place (plan.start_m)"
+    place_m = np.mean([contact.point_world_m for contact in last.contacts], axis=0)
+    top_mm = 1e3 * max(float(place[2]) for place in touched)
+    where = f"grasp {last.index + 1} last touched it, at {_place(place_m)}, up to {top_mm:.0f} mm high"
+    return f"{reason}; {where}. {_STEADY}"
+
+
+def _place(place_m: Array) -> str:
+    return f"({1e3 * place_m[0]:.0f}, {1e3 * place_m[1]:.0f}) mm"
