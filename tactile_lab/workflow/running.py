@@ -12,7 +12,7 @@ from calibration.store.admission import UNCALIBRATED, admit
 from drivers.core.configuration import validate
 from drivers.core.errors import ConfigurationError, EstimationError, InterruptionError
 from drivers.simulation.object_names import MESH_PREFIX
-from drivers.simulation.objects import ObjectModel
+from drivers.simulation.objects import ObjectModel, check_object
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
@@ -90,8 +90,10 @@ def check_request(request: SessionRequest) -> Rig:
     if request.policy is not None:
         make_policy(request.policy)
     rig = load_rig(request.rig)
-    if rig.description.kind == "simulated" or rig.description.emulated or request.object_name.startswith(MESH_PREFIX):
+    if rig.description.kind == "simulated" or rig.description.emulated:
         check_fits(rig, request.object_name)
+    elif request.object_name.startswith(MESH_PREFIX):
+        check_object(request.object_name)
     return rig
 
 
