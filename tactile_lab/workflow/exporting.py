@@ -121,6 +121,28 @@ def export_hdf5(session: Session, path: Path) -> int:
     return write_hdf5(_tables(session), path)
 
 
+def export_parquet(session: Session, folder: Path) -> int:
+    """All samples as Parquet tables; gives their rows. Raises SessionError, or ConfigurationError without PyArrow."""
+    require_package("pyarrow")
+    from sessions.exchange.parquet_tables import write_parquet
+
+    return write_parquet(_tables(session), folder)
+
+
+def export_lerobot(session: Session, folder: Path) -> int:
+    """The session as a LeRobotDataset of one episode; gives its frames. Raises SessionError, or ConfigurationError
+    without PyArrow.
+    """
+    require_package("pyarrow")
+    from tactile_lab.viewers.lerobot.dataset import Label, RATE_Hz, write_lerobot
+    from tactile_lab.viewers.lerobot.sampling import SampledSession
+
+    sampled, manifest = SampledSession(session, RATE_Hz), session.manifest
+    robot = f"shadow-hand-{sampled.robot.prefix.rstrip('_')}"
+    task = f"touch {manifest.object_name or 'the object'}, and estimate its pose and shape"
+    return write_lerobot(folder, sampled, Label(robot, task))
+
+
 def export_rosbag(session: Session, folder: Path) -> int:
     """Frames, markers and all samples as a ROS 2 bag; gives its messages. Raises SessionError, or ConfigurationError
     without rosbags.
@@ -203,6 +225,8 @@ def export_tum(session: Session, folder: Path) -> int:
 EXPORTS: Mapping[str, Callable[[Session, Path], int]] = {
     "csv": export_csv,
     "hdf5": export_hdf5,
+    "parquet": export_parquet,
+    "lerobot": export_lerobot,
     "rosbag": export_rosbag,
     "foxglove": export_foxglove,
     "rerun": export_rerun,
@@ -213,6 +237,8 @@ EXPORTS: Mapping[str, Callable[[Session, Path], int]] = {
 UNITS = {
     "csv": "rows",
     "hdf5": "rows",
+    "parquet": "rows",
+    "lerobot": "frames",
     "rosbag": "messages",
     "foxglove": "messages",
     "rerun": "entries",

@@ -18,6 +18,7 @@ import trimesh
 import yaml
 from gtsam import Pose3
 from mcap.reader import make_reader
+from pyarrow import parquet
 from rosbags.highlevel import AnyReader
 
 from drivers.core.contacts import Grasp
@@ -163,14 +164,17 @@ def piece(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_session_is_exported_in_every_form_and_opens_in_programs_that_are_not_ours(inside, piece, tmp_path):
     forms = {
         "csv": "tables", "hdf5": "all.h5", "rosbag": "bag", "foxglove": "all.mcap", "rerun": "all.rrd",
-        "archive": "all.zip",
+        "archive": "all.zip", "parquet": "columns", "lerobot": "dataset",
     }  # fmt: skip
     options = [word for form, name in forms.items() for word in (f"--{form}", tmp_path / name)]
     answer = inside("session", "export", piece, *options, "--json")
     assert answer.code == 0, answer.err
     told = json.loads(answer.out)
     assert all(told[form] == str(tmp_path / name) for form, name in forms.items())
-    assert told["rosbag_written"] > told["csv_written"] == told["hdf5_written"] > 300
+    assert told["rosbag_written"] > told["csv_written"] == told["hdf5_written"] == told["parquet_written"] > 300
+    assert 4 <= told["lerobot_written"] <= 6  # ten a second
+    wrenches = parquet.read_table(tmp_path / "columns" / "wrench_FF.parquet")
+    assert wrenches.schema.field("tx_Nm").metadata == {b"unit": b"N m"}
     with (tmp_path / "tables" / "joints.csv").open(newline="") as file:
         lines = sum(1 for _ in csv.DictReader(file))
     with h5py.File(tmp_path / "all.h5") as file:
@@ -189,7 +193,7 @@ def test_a_session_is_exported_in_every_form_and_opens_in_programs_that_are_not_
         refused(inside("session", "export", piece, f"--{form}", tmp_path / name), 2, name, "exists already")
 
 
-@pytest.mark.parametrize("form", ["csv", "hdf5", "rosbag", "foxglove", "rerun", "archive"])
+@pytest.mark.parametrize("form", ["csv", "hdf5", "parquet", "lerobot", "rosbag", "foxglove", "rerun", "archive"])
 def test_an_export_to_where_nothing_can_be_written_is_refused(inside, piece, recorded, tmp_path, form):
     (tmp_path / "file").write_text("in the way")
     session = recorded if form == "contacts" else piece

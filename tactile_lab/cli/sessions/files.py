@@ -43,6 +43,12 @@ def export(
     ] = None,
     csv: Annotated[Path | None, typer.Option(help="Write CSV tables and pictures to this new folder.")] = None,
     hdf5: Annotated[Path | None, typer.Option(help="Write all samples and pictures to this new HDF5 file.")] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(help="Write Parquet tables with units to this new folder, pictures among them.")
+    ] = None,
+    lerobot: Annotated[
+        Path | None, typer.Option(help="Write a LeRobotDataset of one episode to this new folder.")
+    ] = None,
     rosbag: Annotated[
         Path | None, typer.Option(help="Write a ROS 2 bag to this new folder (needs the package rosbags).")
     ] = None,
@@ -82,6 +88,8 @@ def export(
     kinds = {
         "csv": csv,
         "hdf5": hdf5,
+        "parquet": parquet,
+        "lerobot": lerobot,
         "rosbag": rosbag,
         "foxglove": foxglove,
         "rerun": rerun,

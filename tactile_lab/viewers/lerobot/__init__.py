@@ -1,0 +1,1 @@
+"""Sessions as datasets for robot learning, in the form of the package ``lerobot``."""
