@@ -101,6 +101,11 @@ class ProcessFeed(ABC):
         """Process id while it runs."""
         return None if self._process is None else self._process.pid
 
+    @property
+    def running(self) -> bool:
+        """Whether the process was started, and has not ended."""
+        return self._process is not None and self._process.poll() is None
+
     # --- out ---------------------------------------------------------------------------------------------------
 
     def write(self, topic: str, data: bytes, stamp_ns: int) -> None:

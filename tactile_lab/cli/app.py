@@ -11,7 +11,7 @@ from drivers.core.extensions import load_extension, load_named_extensions
 from tactile_lab.cli import bench, experiment, markers, plugins, rig
 from tactile_lab.cli.calibrate import calibrate
 from tactile_lab.cli.commands import COMMANDS, Commands
-from tactile_lab.cli.running import run, sweep
+from tactile_lab.cli.running import ros2_bridge, run, sweep
 from tactile_lab.cli.sessions import evaluate, model, reconstruct, report, session, view
 
 app = typer.Typer(
@@ -28,6 +28,7 @@ COMMANDS.register("reconstruct", reconstruct.reconstruct)
 COMMANDS.register("evaluate", evaluate.evaluate)
 COMMANDS.register("report", report.report)
 COMMANDS.register("view", view.view)
+COMMANDS.register("ros2-bridge", ros2_bridge.ros2_bridge)
 COMMANDS.register("markers", markers.markers)
 COMMANDS.register("sweep", sweep.sweep)
 COMMANDS.register("bench", bench.bench)

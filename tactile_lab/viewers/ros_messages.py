@@ -15,9 +15,11 @@ from tactile_lab.viewers.items import (
     Candidates,
     Frames,
     Item,
+    Joints,
     Lens,
     ObjectPose,
     Picture,
+    SensorWrench,
     Surface,
     Touches,
 )
@@ -78,6 +80,17 @@ class RosMessages:
         """The messages of an item; none for one that the tables hold at full rate."""
         if (make := self._makers.get(type(item))) is not None:
             yield from make(item)
+
+    def live(self, item: Item) -> Made:
+        """The messages of an item of a running session, which has no tables."""
+        if isinstance(item, Joints):
+            state = self.joint_state(item.stamp_ns, list(item.positions), list(item.positions.values()))
+            yield "/joint_states", JOINT_STATE, item.stamp_ns, state
+        elif isinstance(item, SensorWrench):
+            wrench = self.wrench(item.stamp_ns, item.finger, [*item.force_N, *item.torque_Nm])
+            yield f"/ft/{item.finger}/wrench", WRENCH, item.stamp_ns, wrench
+        else:
+            yield from self.of(item)
 
     # --- rows of tables ----------------------------------------------------------------------------------------
 

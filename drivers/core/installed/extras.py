@@ -24,6 +24,7 @@ EXTRAS = {
     "distributed": "cluster",
     "pyarrow": "export",
     "rosbags": "ros",
+    "cyclonedds": "ros",
     "pxr": "usd",
 }
 """Top-level modules, and the extra of ``pyproject.toml`` that installs each."""

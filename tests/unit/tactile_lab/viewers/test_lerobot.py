@@ -200,6 +200,7 @@ def test_lerobot_loads_it(dataset, columns, monkeypatch):
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
     reason = "the package lerobot is not installed"
     module = pytest.importorskip("lerobot.datasets.lerobot_dataset", reason=reason, exc_type=ImportError)
+    monkeypatch.setattr("tqdm.tqdm.monitor_interval", 0)  # its bars leave a thread behind
     loaded = module.LeRobotDataset("tactile-lab/told", root=dataset, delta_timestamps={"action": [0.0, 0.1]})
     assert (len(loaded), loaded.num_episodes, loaded.meta.robot_type) == (FRAMES, 1, "shadow-hand-rh")
     row = loaded.hf_dataset[FRAMES - 1]
