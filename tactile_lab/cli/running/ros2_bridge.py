@@ -62,7 +62,8 @@ def ros2_bridge(
     """
     from tactile_lab.cli.console import say
     from tactile_lab.viewers.ros2.feed import Ros2Feed
-    from tactile_lab.viewers.ros2.node import Reach, require_ros2
+    from tactile_lab.viewers.ros2.node import Reach
+    from tactile_lab.viewers.ros2.opening import require_ros2
     from tactile_lab.workflow.running import SessionRequest, check_request
 
     require_ros2()

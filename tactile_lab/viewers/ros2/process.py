@@ -19,7 +19,8 @@ from drivers.core.errors import TactileLabError
 from sessions.recording.traffic import schemas
 from tactile_lab.viewers.ros2.conversion import Conversion
 from tactile_lab.viewers.ros2.feed import STATE_TOPIC
-from tactile_lab.viewers.ros2.node import NODE, Node, Reach, open_node
+from tactile_lab.viewers.ros2.node import NODE, Node, Reach
+from tactile_lab.viewers.ros2.opening import open_node
 from tactile_lab.viewers.ros2.services import SERVICES, Services
 
 

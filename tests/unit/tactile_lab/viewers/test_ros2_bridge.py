@@ -16,10 +16,11 @@ from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import ConfigurationError, DeviceError
 from sessions.guided.operator import Ask, Request
 from tactile_lab import process_feed
-from tactile_lab.viewers.ros2 import node as node_module
+from tactile_lab.viewers.ros2 import opening
 from tactile_lab.viewers.ros2.conversion import Conversion, Serialized
 from tactile_lab.viewers.ros2.feed import Ros2Feed
-from tactile_lab.viewers.ros2.node import Reach, require_ros2
+from tactile_lab.viewers.ros2.node import Reach
+from tactile_lab.viewers.ros2.opening import require_ros2
 from tactile_lab.viewers.ros2.services import SERVICES, Services
 from tests.support import told_session
 
@@ -184,7 +185,7 @@ def feed(dds: SimpleNamespace) -> Iterator[Ros2Feed]:
 @pytest.fixture(autouse=True, scope="module")
 def _threads_of_the_feed_begin_before_a_test_counts_them(request: pytest.FixtureRequest) -> None:
     """The module's bridge has threads."""
-    if sys.modules.get("cyclonedds") or node_module.find_spec("cyclonedds"):
+    if sys.modules.get("cyclonedds") or opening.find_spec("cyclonedds"):
         request.getfixturevalue("feed")
 
 
@@ -301,10 +302,10 @@ def test_where_ros_is_its_own_library_publishes_and_answers(monkeypatch):
     monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE", raising=False)
     monkeypatch.setenv("ROS_DOMAIN_ID", "0")
     ros = FakeRos(monkeypatch)
-    monkeypatch.setattr(node_module, "has_rclpy", lambda: True)
+    monkeypatch.setattr(opening, "has_rclpy", lambda: True)
     with monkeypatch.context() as patch:
         patch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-        opened = node_module.open_node(Reach(5))
+        opened = opening.open_node(Reach(5))
         opened.publish("/x", "std_msgs/msg/String", b"bytes", lasting=True)
         opened.serve("undo", lambda: (False, "no session"))
         response = ros.services["/tactile_lab/undo"](None, SimpleNamespace())
@@ -316,6 +317,6 @@ def test_where_ros_is_its_own_library_publishes_and_answers(monkeypatch):
 
 def test_without_either_library_the_extra_is_named(monkeypatch):
     monkeypatch.setattr("drivers.core.installed.extras.find_spec", lambda name: name == "rosbags" or None)
-    monkeypatch.setattr(node_module, "find_spec", lambda name: None)
+    monkeypatch.setattr(opening, "find_spec", lambda name: None)
     with pytest.raises(ConfigurationError, match=r"cyclonedds of the extra \[ros\]"):
         require_ros2()
