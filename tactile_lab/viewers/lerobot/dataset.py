@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.core.errors import SessionError
@@ -56,7 +57,7 @@ class _Column:
     """A column of the data with its entry in the description."""
 
     description: Mapping[str, Any]
-    values: Array
+    values: NDArray[Any]
 
 
 def write_lerobot(folder: Path, sampled: SampledSession, label: Label) -> int:
