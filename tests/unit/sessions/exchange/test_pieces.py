@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.core.errors import ConfigurationError, SessionError
+from drivers.core.errors import ConfigurationError
 from sessions.exchange.extracting import Piece, extract
 from sessions.recording.session import TRAFFIC, Session, create_session
 from sessions.recording.traffic.reader import TrafficReader
@@ -58,6 +58,6 @@ def test_the_calibration_is_kept_inside_unless_it_is_not_wanted(session: Session
 def test_what_is_not_there_is_named_and_leaves_no_folder(session: Session, tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match="camera"):
         extract(session, tmp_path / "piece", Piece(transports=["camera", "hand"]))
-    with pytest.raises(SessionError, match="nothing was recorded"):
+    with pytest.raises(ConfigurationError, match="nothing was recorded"):
         extract(session, tmp_path / "piece", Piece(from_s=60.0))
     assert not (tmp_path / "piece").exists()
