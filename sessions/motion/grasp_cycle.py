@@ -12,6 +12,7 @@ from drivers.shadow.closing.closing import SIDES, Closing, closing
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.finger_gaps import is_near, nears
 from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
 from sessions.motion.motion import GraspFrame, Motion
@@ -206,22 +207,28 @@ class GraspCycle:
             for finger in moving:
                 touched[finger] = touched[finger] + 1 if loads_N.get(finger, 0.0) > s.touch_force_N else 0
             held_up = self._motion.bent(s.held_up_rad)
-            moving = {f for f in moving if touched[f] < s.touch_cycles and f not in held_up and self._may_close(f)}
+            moving = {
+                f for f in moving if touched[f] < s.touch_cycles and f not in held_up and self._may_close(f, step_m)
+            }
             for finger in sorted(moving):
                 self._progress[finger] += step_m / table.path(finger).length_m
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
         self._touching = frozenset(finger for finger in self._fingers if touched[finger] >= s.touch_cycles)
 
-    def _may_close(self, finger: str) -> bool:
-        return self._progress[finger] < self._table().path(finger).valid[1] and not self._meets_thumb(finger)
+    def _may_close(self, finger: str, step_m: float) -> bool:
+        path = self._table().path(finger)
+        on = self._progress[finger] + step_m / path.length_m
+        return self._progress[finger] < path.valid[1] and not (self._meets_thumb(finger) or self._nears(finger, on))
 
     def _meets_thumb(self, finger: str) -> bool:
         """Whether this tip and the thumb's (any other's, for the thumb) are about to touch each other."""
-        centres = {f: self._table().path(f).centre_m(self._progress[f]) for f in self._fingers}
         others = self._hand.form.long_fingers if finger == "TH" else ("TH",)
-        gap_m = min(float(np.linalg.norm(centres[finger] - centres[other])) for other in others)
-        return gap_m < self.settings.finger_gap_m
+        return is_near(self._table(), self._progress, finger, others, self.settings.finger_gap_m)
+
+    def _nears(self, finger: str, to: float) -> bool:
+        """Whether this tip would touch another on its way to a progress."""
+        return nears(self._table(), self._progress, finger, to, 2 * self._hand.radius_m)
 
     def settle(self) -> None:
         """Bring the fingers that touch to the contact force, then let hand and object come to rest."""
@@ -311,7 +318,9 @@ class GraspCycle:
         for finger, error_N in errors_N.items():
             path = table.path(finger)
             step = s.squeeze_gain * error_N * self._motion.cycle_s / path.length_m
-            self._progress[finger] = float(np.clip(self._progress[finger] + step, *path.valid))
+            to = float(np.clip(self._progress[finger] + step, *path.valid))
+            if step < 0.0 or not self._nears(finger, to):
+                self._progress[finger] = to
         self._motion.set_fingers(table, self._progress)
 
     def _pressed_fingers(self, force_N: float) -> tuple[str, ...]:
@@ -327,15 +336,21 @@ class GraspCycle:
     def release(self) -> None:
         """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Overloaded fingers are released first, the others wait for them.
+        Overloaded fingers are released first, the others wait for them, or go on where they stand in their way.
         """
         table, closed, opened = self._table(), self._progress, self._open_progress()
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
         shares = dict.fromkeys(self._fingers, 0.0)
+
+        def place(finger: str, share: float) -> float:
+            return closed[finger] + min(1.0, share) * (opened[finger] - closed[finger])
+
         while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
-            for finger in closed_still & self._overloaded_fingers() or closed_still:
+            urgent = closed_still & self._overloaded_fingers()
+            free = {finger for finger in closed_still if not self._nears(finger, place(finger, shares[finger] + step))}
+            for finger in urgent & free or free or closed_still:
                 shares[finger] = min(1.0, shares[finger] + step)
-            self._progress = {finger: u + shares[finger] * (opened[finger] - u) for finger, u in closed.items()}
+            self._progress = {finger: place(finger, shares[finger]) for finger in closed}
             self._motion.set_fingers(table, self._progress)
             self._motion.tick()
 

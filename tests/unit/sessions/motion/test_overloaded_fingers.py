@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -177,6 +178,34 @@ def test_a_finger_that_stays_strained_does_not_keep_the_hand_closed(strain: Stra
     strain.cycle.release()
     opened = {finger: strain.cycle._table().path(finger).valid[0] for finger in FINGERS}
     assert ways(strain.cycle) == pytest.approx(opened)
+
+
+def test_a_strained_finger_opens_no_farther_than_its_neighbour_leaves_room(strain: Strain) -> None:
+    """The middle finger, opened alone from a radial grasp, came to where the first finger was: its sensor saturated."""
+    cycle, gaps_m = strain.cycle, list[float]()
+    cycle._plan = GraspPlan(GraspFrame(0.0, 0.0, 0.3), "radial", 0.034)
+    cycle._progress = dict.fromkeys(FINGERS, 0.97)
+    strain.extra_N = {"MF": 20.0}
+
+    def watch(world: DiscWorld) -> None:
+        centres = [cycle._table().path(finger).centre_m(cycle._progress[finger]) for finger in ("FF", "MF")]
+        gaps_m.append(float(np.linalg.norm(centres[0] - centres[1])))
+
+    strain.world.before_cycle = watch
+    cycle.release()
+    assert min(gaps_m) > 2 * TIP.radius_m - 0.001
+    assert ways(cycle) == pytest.approx({finger: cycle._table().path(finger).valid[0] for finger in FINGERS})
+
+
+def test_a_finger_closes_no_farther_than_to_its_neighbour(strain: Strain) -> None:
+    """The middle finger has stopped early on something narrow; the first would close to the same place."""
+    assert strain.cycle.descend(replace(PLAN, closing="radial"))
+    strain.cycle._progress["MF"] = 0.73
+    strain.held_rad = {"MFJ0": 0.3}
+    strain.world.disc = None
+    strain.cycle.close()
+    first, middle = (strain.cycle._table().path(f).centre_m(ways(strain.cycle)[f]) for f in ("FF", "MF"))
+    assert np.linalg.norm(first - middle) > 2 * TIP.radius_m - 0.001
 
 
 def test_coupled_joints_are_compared_together(strain: Strain) -> None:
