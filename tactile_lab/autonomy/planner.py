@@ -295,6 +295,8 @@ class Planner:
         """
         if self._chooser is not None and not is_placed:
             self._chooser.on_unplaced_grasp()
+        if self._standing is not None:
+            self._standing.on_estimate(is_placed)
         known, expected = self.known_shape(), self._expected_pose()
         if known is not None:
             self._standstill.note(known.explored)

@@ -18,6 +18,13 @@ from tactile_lab.autonomy.standing.side_planner import SidePlanner
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
 
 _GRASPS, _LEAST_GAIN = 3, 0.01
+_ASTRAY = 2
+"""Grasps in a row that went astray: the object does not stand where it stood."""
+
+_FALLEN = (
+    "has fallen over or was moved: {grasps} grasps in a row met less than half of what was expected, and fit nothing "
+    "felt before. Steady it (putty under its foot, more weight) or lay it down (--pose lying), and start again; {size}"
+)
 
 
 class Standstill:
@@ -56,6 +63,8 @@ class StandingPlanner:
     _current: StandingCandidate | None = None
     _touches: int = 0
     _blocked: int = 0
+    _astray: int = 0
+    _met_little: bool = False
     _grasping: SidePlanner = field(init=False)
     _touching: TouchPlanner | None = field(init=False)
 
@@ -65,7 +74,9 @@ class StandingPlanner:
         self._touching = None if self.settings is None else TouchPlanner(*where, self.settings)
 
     def plan(self) -> GraspPlan | None:
-        """The next grasp or touch; None where nothing is left that would tell anything new."""
+        """The next grasp or touch; None where nothing is left that would tell anything new, or it has fallen over."""
+        if self._astray >= _ASTRAY:
+            return None
         offers = [self._grasping.best(), None if self._touching is None else self._touching.best()]
         self._current = max((one for one in offers if one), key=lambda one: one.score_m, default=None)
         return None if self._current is None else self._current.plan
@@ -82,7 +93,16 @@ class StandingPlanner:
             return
         self._touches += done.plan.only_touch
         touched = frozenset() if done.plan.only_touch else grasp.touching
+        self._met_little = not done.plan.only_touch and len(touched) < len(done.touches) / 2
         self.felt.on_looked([place for finger, place in done.touches.items() if finger not in touched])
+
+    def on_estimate(self, is_placed: bool) -> None:
+        """Take note whether the contacts of the last grasp fit what was felt before."""
+        if is_placed:
+            self._astray = 0
+        elif self._met_little:
+            self._astray += 1
+        self._met_little = False
 
     def on_blocked(self) -> None:
         """Take note that the hand met something on its way."""
@@ -102,6 +122,8 @@ class StandingPlanner:
     @property
     def exhausted(self) -> str:
         """Why there is nothing else to do, in words."""
+        if self._astray >= _ASTRAY:
+            return f"the object {_FALLEN.format(grasps=self._astray, size=self.felt.in_words())}"
         grasps = self.felt.grasps - self._touches
         touches = f", {self._touches} touches" if self._touches else ""
         blocked = f", {self._blocked} approaches were blocked" if self._blocked else ""

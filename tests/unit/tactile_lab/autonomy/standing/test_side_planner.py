@@ -102,6 +102,31 @@ def test_next_grasp_is_where_nothing_was_touched_until_nothing_is_left() -> None
     assert "mm high" in beside.exhausted
 
 
+def meet_one(beside: StandingPlanner, *, is_placed: bool) -> bool:
+    """The next grasp, of which one finger meets something; whether there was one."""
+    if (plan := beside.plan()) is None:
+        return False
+    touches = expected_touches(plan, TIP, standing(beside.felt.box), standing(beside.felt.box))
+    beside.on_grasp(grasp(np.array([touches["TH"]]), ["TH"]))
+    beside.on_estimate(is_placed)
+    return True
+
+
+def test_grasps_that_hardly_meet_what_fits_nothing_end_with_a_fallen_object() -> None:
+    beside = planner(box())
+    assert meet_one(beside, is_placed=False)
+    assert meet_one(beside, is_placed=False)
+    assert not meet_one(beside, is_placed=False)
+    assert beside.exhausted.startswith("the object has fallen over or was moved: 2 grasps in a row")
+    assert "mm high" in beside.exhausted
+
+
+def test_one_grasp_beside_the_object_is_no_fall_nor_are_two_that_fit() -> None:
+    beside = planner(box())
+    assert all(meet_one(beside, is_placed=is_placed) for is_placed in (False, True, False, True, True))
+    assert beside.plan() is not None
+
+
 def test_a_blocked_way_is_not_tried_again_as_deep() -> None:
     beside = planner(box())
     first = beside.plan()
