@@ -139,7 +139,7 @@ class GraspByKeys(GraspCycle):
         for _ in range(cycles):
             if way_m > 0.0:
                 moving -= set(self._pressed_fingers(self.settings.touch_force_N))
-                moving = {finger for finger in moving if self._may_close(finger)}
+                moving = {finger for finger in moving if self._may_close(finger, way_m / cycles)}
             for finger in moving:
                 step = way_m / cycles / table.path(finger).length_m
                 self._progress[finger] = float(np.clip(self._progress[finger] + step, *table.path(finger).valid))
