@@ -39,6 +39,8 @@ class Contact:
         force_N: magnitude of the contact force.
         probed: touched before the hand closed (a tap on the top, a probe from the side), with the object not moved
             until the grasp.
+        shared_covariance_m2: the part of ``point_covariance_m2`` by errors that all touches of this finger share during
+            a session (offsets of its joint sensors), shape (3, 3): more touches do not reduce it; None for none.
     """
 
     finger: str
@@ -48,6 +50,7 @@ class Contact:
     normal_sigma_rad: float = float(np.deg2rad(5.0))
     force_N: float = 0.0
     probed: bool = False
+    shared_covariance_m2: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -151,6 +151,8 @@ class FingertipCalibration(StrictModel):
         force_sigma_N, moment_sigma_Nm: noise of one sample, per axis.
         force_drift_N, moment_drift_Nm: drift since the tare, per axis, one standard deviation.
         point_floor_m, normal_floor_rad: error of shape and mounting that averaging does not reduce, per axis.
+        yield_m, yield_exponent: how far the skin yields under a normal force of 1 N, and the power of the force with
+            which that grows (2/3: a ball of an elastic material, Hertz). The contact is that much inside the ellipsoid.
     """
 
     semi_axes_m: tuple[PositiveFloat, PositiveFloat, PositiveFloat]
@@ -166,6 +168,12 @@ class FingertipCalibration(StrictModel):
     moment_drift_Nm: float = Field(default=5e-5, ge=0.0)
     point_floor_m: float = Field(default=0.0003, ge=0.0)
     normal_floor_rad: float = Field(default=0.02, ge=0.0)
+    yield_m: float = Field(default=0.0, ge=0.0, le=0.005)
+    yield_exponent: float = Field(default=2 / 3, gt=0.0, le=1.0)
+
+    def indentation_m(self, normal_force_N: Array) -> Array:
+        """How far the skin is pressed in by forces along its normal, newton, of any shape."""
+        return np.asarray(self.yield_m * np.maximum(normal_force_N, 0.0) ** self.yield_exponent)
 
 
 def _known_fingers(fingertips: dict[str, FingertipCalibration]) -> dict[str, FingertipCalibration]:

@@ -25,7 +25,7 @@ from drivers.force.intrinsic_contact import (
 )
 from drivers.force.plausibility import WrenchMonitor, objection
 from drivers.force.sequences import SequenceMonitor
-from drivers.force.touches import tip_touches
+from drivers.force.touches import pressed_points, tip_touches
 
 __all__ = ["AXES", "CAPTURE_LIMIT", "ForceTip", "ForceTipSettings", "Tare", "WrenchSample"]
 
@@ -251,7 +251,7 @@ class ForceTip:
         covariance = self._to_centre @ sensor_covariance @ self._to_centre.T
         point, normal = contact_covariance(contact, force, np.array(model.semi_axes_m), covariance)
         return TipContact(
-            point_distal_m=contact.point_m + np.array(model.centre_distal_m),
+            point_distal_m=pressed_points(contact, force, model),
             normal_distal=-contact.normal,
             point_covariance_m2=point + model.point_floor_m**2 * np.eye(3),
             normal_sigma_rad=math.sqrt(float(np.trace(normal)) / 2.0 + model.normal_floor_rad**2),

@@ -27,8 +27,9 @@ def tip_touches(
     """
     contact = contact_on_ellipsoid(wrenches[:, :3], wrenches[:, 3:], np.array(calibration.semi_axes_m))
     forces_N = np.linalg.norm(wrenches[:, :3], axis=-1)
-    points_m = contact.point_m + np.array(calibration.centre_distal_m)
-    certain = ~is_void & (forces_N > LEAST_FORCE_N) & _is_possible(contact, points_m, calibration, settings)
+    on_skin_m = contact.point_m + np.array(calibration.centre_distal_m)
+    certain = ~is_void & (forces_N > LEAST_FORCE_N) & _is_possible(contact, on_skin_m, calibration, settings)
+    points_m = pressed_points(contact, wrenches[:, :3], calibration)
     return TipTouches(
         points_distal_m=np.where(certain[:, None], points_m, 0.0),
         normals_distal=np.where(certain[:, None], -contact.normal, 0.0),
@@ -37,6 +38,22 @@ def tip_touches(
         is_certain=certain,
         is_void=is_void,
     )
+
+
+def pressed_points(contact: EllipsoidContact, forces_N: Array, calibration: FingertipCalibration) -> Array:
+    """Where the object's surface is: the contacts on the ellipsoid, moved inwards as far as the skin yields.
+
+    Args:
+        contact: with any leading shape, axes parallel to the distal frame, origin in the ellipsoid's centre.
+        forces_N: of these contacts, shape (..., 3).
+        calibration: of the fingertip.
+
+    Returns:
+        Points in the distal frame, shape (..., 3).
+    """
+    pressing_N = -np.sum(forces_N * contact.normal, axis=-1)
+    indented_m = calibration.indentation_m(pressing_N)[..., None] * contact.normal
+    return np.asarray(contact.point_m - indented_m + np.array(calibration.centre_distal_m))
 
 
 def _is_possible(

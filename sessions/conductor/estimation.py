@@ -39,5 +39,5 @@ class Estimation:
     def _record(self, estimate: Estimate) -> None:
         recorder, now_ns, step = self._runtime.recorder, self._runtime.clock.now_ns(), estimate.step
         state = {"index": step.index, "verdict": step.verdict, "reason": step.reason, "seconds": step.seconds}
-        recorder.slam(now_ns, step.world_T_object, state, step.covariance)
+        recorder.slam(now_ns, step.world_T_object, {**state, **estimate.trust}, step.covariance)
         recorder.surface(now_ns, estimate.surface)

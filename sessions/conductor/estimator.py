@@ -7,7 +7,7 @@ answers may come from its own process or from another one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -67,11 +67,14 @@ class Estimate:
         step: the pose, consistent with the surface.
         surface: the shape as plain data for recording and display (topic ``/slam/surface``).
         explored: share of the surface that is known, 0..1; None before there is one.
+        trust: what may be believed of it, as plain data for recording and display: ``status``, and ``doubts`` and
+            ``alternatives`` as sentences; empty where the estimator does not say.
     """
 
     step: PoseStep
     surface: dict[str, Any]
     explored: float | None
+    trust: dict[str, Any] = field(default_factory=dict)
 
 
 class Estimator(Protocol):

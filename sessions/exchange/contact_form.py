@@ -115,6 +115,7 @@ class ContactEntry(StrictModel):
     normal_world: Annotated[Vector, AfterValidator(_unit)]
     point_sigma_m: _Length | None = Field(default=None, gt=0.0)
     point_covariance_m2: CovarianceRows | None = None
+    shared_covariance_m2: CovarianceRows | None = None
     normal_sigma_rad: _Angle | None = Field(default=None, gt=0.0)
     force_N: float | None = Field(default=None, ge=0.0)
 

@@ -180,6 +180,7 @@ def _contact(entry: ContactEntry, document: Document) -> Contact:
         point_covariance_m2=sigma_m**2 * np.eye(3) if own is None else np.array(own),
         normal_sigma_rad=entry.normal_sigma_rad or document.normal_sigma_rad,
         force_N=entry.force_N or 0.0,
+        shared_covariance_m2=None if entry.shared_covariance_m2 is None else np.array(entry.shared_covariance_m2),
     )
 
 
@@ -234,6 +235,8 @@ def _contact_entry(contact: Contact, log: ContactLog, scale: Array) -> dict[str,
     }
     if not np.array_equal(contact.point_covariance_m2, log.point_sigma_m**2 * np.eye(3)):
         entry["point_covariance_m2"] = covariance.tolist()
+    if contact.shared_covariance_m2 is not None:
+        entry["shared_covariance_m2"] = (contact.shared_covariance_m2 * np.outer(scale, scale)).tolist()
     if normal_sigma_rad != log.normal_sigma_rad:
         entry["normal_sigma_rad"] = normal_sigma_rad
     if contact.force_N:

@@ -4,7 +4,8 @@ The covariance of a contact point is the sum of three independent parts:
 
 * the sensor's own, rotated into the world;
 * the joint angles', through the finger's Jacobian: the joint sensors carry a bias of about 0.6 deg that no averaging
-  removes. The wrist is left out: its error moves all contacts alike, as the mounting's does;
+  removes, so that all contacts of a finger share it. The wrist is left out: its error moves all contacts alike, as the
+  mounting's does;
 * the forearm-to-world calibration's, where its covariance is known.
 
 The direction of the normal gets the same three parts as one standard deviation per axis.
@@ -101,7 +102,8 @@ def _contact(
     normal = rotation @ tip.normal_distal
     moves = derivatives[:, :3, :3] @ tip.point_distal_m + derivatives[:, :3, 3]
     turns = _rotation_vectors(derivatives[:, :3, :3] @ rotation.T)
-    covariance = rotation @ tip.point_covariance_m2 @ rotation.T + joint_sigma_rad**2 * moves.T @ moves
+    by_joints = joint_sigma_rad**2 * moves.T @ moves
+    covariance = rotation @ tip.point_covariance_m2 @ rotation.T + by_joints
     turn_covariance = joint_sigma_rad**2 * turns.T @ turns
     if mount is not None:
         mount_covariance, mount_turn = mount.at(point)
@@ -113,6 +115,7 @@ def _contact(
         point_covariance_m2=(covariance + covariance.T) / 2,
         normal_sigma_rad=float(np.sqrt(tip.normal_sigma_rad**2 + _tilt_variance(turn_covariance, normal))),
         force_N=tip.force_N,
+        shared_covariance_m2=by_joints,
     )
 
 

@@ -18,10 +18,13 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
+from tactile_lab.autonomy.rival_objects import rival_objects
 from tactile_lab.autonomy.standing.candidate import SideReach
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp, known_shape
+from tactile_lab.slam.doubt.assessment import Assessment
+from tactile_lab.slam.exploration.policy import RivalObject
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 from tactile_lab.slam.tactile_slam import TactileSlam
@@ -75,6 +78,8 @@ class Planner:
         self._slam, self._rule, self._exploration = slam, rule, exploration
         self._fixed_grasps, self._hand, self._dimension = fixed_grasps, hand, dimension
         self._known: tuple[Gpis, KnownShape] | None = None
+        self._assessed: tuple[KnownShape | None, Assessment] | None = None
+        self._compared: tuple[tuple[Assessment, Pose3], tuple[RivalObject, ...]] | None = None
         self._hand_motion = Pose3()
         self._landings_m: list[Array] = []
         self._by_estimate = False
@@ -182,7 +187,14 @@ class Planner:
             return None
         left = None if self._grasps is None else self._grasps - index
         spread = self._chooser.spread(covariance, self._carried)
-        return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here)
+        return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here, self._rivals())
+
+    def _rivals(self) -> tuple[RivalObject, ...]:
+        key = self.assessment(), self._hand_motion
+        if self._compared is None or any(one is not other for one, other in zip(self._compared[0], key, strict=True)):
+            found = rival_objects(self._slam, key[0].alternatives, self._hand_motion, self._exploration)
+            self._compared = key, found
+        return self._compared[1]
 
     def on_bounding_box(self, box: BoundingBox) -> None:
         """Note the bounding box: the object is in its middle, and open fingers keep out of it.
@@ -316,6 +328,13 @@ class Planner:
         if self._known is None or self._known[0] is not field:
             self._known = (field, self._measure_shape(field))
         return self._known[1]
+
+    def assessment(self) -> Assessment:
+        """What may be believed of the present estimate."""
+        known = self.known_shape()
+        if self._assessed is None or known is None or self._assessed[0] is not known:
+            self._assessed = known, self._slam.assess(None if known is None else known.extracted)
+        return self._assessed[1]
 
     def _measure_shape(self, field: Gpis) -> KnownShape:
         shape = self._slam.shape(self._exploration.mesh_resolution_m) if self._dimension == 3 else None

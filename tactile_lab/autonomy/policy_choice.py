@@ -20,7 +20,7 @@ from tactile_lab.autonomy.regrasp_planner import RegraspPlanner, with_contacts
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.exploration.asking import ask
 from tactile_lab.slam.exploration.candidates import ModelledObject, PredictedContacts, predict_contacts
-from tactile_lab.slam.exploration.policy import Belief, Decision, Policy
+from tactile_lab.slam.exploration.policy import Belief, Decision, Policy, RivalObject
 from tactile_lab.slam.exploration.prediction import sampled_displacements
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
@@ -38,6 +38,7 @@ class Knowledge:
         grasp_indices: which grasp each contact of the shape belongs to.
         grasps_left: that the session may still make.
         here: pose of the hand; None if unknown.
+        rivals: the object as it is if an alternative to the estimate is right.
     """
 
     known: KnownShape
@@ -46,6 +47,7 @@ class Knowledge:
     grasp_indices: NDArray[np.intp]
     grasps_left: int | None = None
     here: GraspFrame | None = None
+    rivals: tuple[RivalObject, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -227,6 +229,7 @@ class PolicyChooser:
             missed_m=np.array(self._missed_m).reshape(-1, known.dimension),
             origin_height_m=known.origin_height_m,
             grasps_left=knowledge.grasps_left,
+            rivals=knowledge.rivals,
         )
 
     def spread(self, covariance: Array, carried: bool) -> Array:

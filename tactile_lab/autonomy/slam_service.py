@@ -22,6 +22,7 @@ from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.freed_memory import return_freed_memory
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.surface_message import surface_message
+from tactile_lab.autonomy.trust_message import trust_message
 from tactile_lab.autonomy.unknown_part import describe_unknown
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.tactile_slam import TactileSlam
@@ -96,7 +97,8 @@ class SlamService:
         self.planner.on_estimate(step.index, step.verdict != "untracked")
         shape = self.planner.known_shape()
         step = replace(step, world_T_object=self.slam.world_T_object)
-        self._estimates.append(Estimate(step, surface_message(shape), None if shape is None else shape.explored))
+        explored, trust = None if shape is None else shape.explored, trust_message(self.planner.assessment())
+        self._estimates.append(Estimate(step, surface_message(shape), explored, trust))
         self._count += 1
         self._estimates = self._estimates[known - self._count :]
         return_freed_memory()

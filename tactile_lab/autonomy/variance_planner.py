@@ -89,6 +89,7 @@ class KnownShape:
         explored: share of the surface that is known, 0..1.
         surface: the measured surface; None if the contacts enclose nothing yet.
         top_height_m: its highest point above the table; None if unknown.
+        extracted: that surface as an outline or mesh; None without one.
     """
 
     field: Gpis
@@ -98,6 +99,7 @@ class KnownShape:
     explored: float
     surface: Surface | None = None
     top_height_m: float | None = None
+    extracted: Contour | SurfaceMesh | None = None
 
 
 def known_shape(
@@ -116,16 +118,18 @@ def known_shape(
             share always follows the field, see :func:`_as_far_as_felt`.
     """
     try:
-        extracted = _surface(field, dimension, settings) if mesh is None else _as_far_as_felt(mesh, field)
+        extracted = extract_surface(field, dimension, settings) if mesh is None else _as_far_as_felt(mesh, field)
     except ShapeError:
         return KnownShape(field, dimension, origin_height_m, np.zeros(2), 0.0)
     surface = Surface.of(extracted)
     centre_m = (surface.points_m[:, :2].min(axis=0) + surface.points_m[:, :2].max(axis=0)) / 2
     top_m = None if dimension == 2 else float(surface.points_m[:, 2].max()) + origin_height_m
-    return KnownShape(field, dimension, origin_height_m, centre_m, explored_share(extracted), surface, top_m)
+    share = explored_share(extracted)
+    return KnownShape(field, dimension, origin_height_m, centre_m, share, surface, top_m, extracted)
 
 
-def _surface(field: Gpis, dimension: int, settings: ExplorationSettings) -> Contour | SurfaceMesh:
+def extract_surface(field: Gpis, dimension: int, settings: ExplorationSettings) -> Contour | SurfaceMesh:
+    """The field's outline or surface. Raises ShapeError: the contacts enclose nothing."""
     if dimension == 2:
         return extract_contour(field, resolution_m=settings.contour_resolution_m)
     return extract_mesh(field, resolution_m=settings.mesh_resolution_m)

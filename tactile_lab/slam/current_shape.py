@@ -126,10 +126,11 @@ def _extract(
     stands = settings.dimension == 3 and settings.freedom == "table"
     floor_m = -origin_height_m if stands else None
     shape = fit_shape(model, field, contact_map.free_points_m, floor_m)
-    if settings.dimension == 2:
-        return shape.contour(resolution_m)
-    mesh = shape.mesh(resolution_m, floor_m)
     uncertain = settings.method == "joint" and "pose uncertainty" not in settings.joint.without
+    if settings.dimension == 2:
+        contour = shape.contour(resolution_m)
+        return propagate_pose_uncertainty(contour, shape, contact_map, settings.motion) if uncertain else contour
+    mesh = shape.mesh(resolution_m, floor_m)
     return propagate_pose_uncertainty(mesh, shape, contact_map, settings.motion) if uncertain else mesh
 
 

@@ -34,7 +34,9 @@ from drivers.core.errors import TrackingError
 from drivers.core.observability import observability, planar_observability
 from drivers.core.one_thread import on_one_thread
 from tactile_lab.slam.current_shape import CurrentShape
-from tactile_lab.slam.doubt.assessment import assess
+from tactile_lab.slam.doubt.assessment import Assessment, assess
+from tactile_lab.slam.doubt.rivals import displaced
+from tactile_lab.slam.doubt.status import Alternative
 from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.slam.graph.relocation import relocated_rows
 from tactile_lab.slam.result import SlamResult, SlamStep, Verdict
@@ -173,14 +175,7 @@ class TactileSlam:
             self._tracker.adopt(self._tracker.map.with_best_kernel(max_iterations=30, longest_m=0.300))
         wanted = self._settings
         shape = self.shape(wanted.contour_resolution_m if wanted.dimension == 2 else wanted.mesh_resolution_m)
-        told = assess(
-            self._tracker,
-            shape,
-            self._settings,
-            self._refused,
-            lost=self.is_lost,
-            origin_height_m=self._origin_height_m,
-        )
+        told = self._assess(shape)
         return SlamResult(
             method=self._settings.method,
             seed=self._seed,
@@ -243,6 +238,36 @@ class TactileSlam:
         """
         contacts = self._shape_contacts()
         return None if contacts is None else self._shape.extract(contacts, self._origin_height_m, resolution_m)
+
+    @on_one_thread
+    def assess(self, shape: Contour | SurfaceMesh | None) -> Assessment:
+        """What may be believed of the present estimate, between grasps.
+
+        Args:
+            shape: the present outline or surface, object frame; None if there is none.
+        """
+        return self._assess(shape)
+
+    def displaced(self, alternative: Alternative) -> ContactMap:
+        """All contacts as they are placed if an alternative to the present estimate is right.
+
+        Raises:
+            TrackingError: there is no estimate yet.
+        """
+        if self._tracker is None:
+            raise TrackingError("there is no estimate yet", where="tactile SLAM", hint="Add grasps first")
+        return displaced(self._tracker.refined, alternative)
+
+    def _assess(self, shape: Contour | SurfaceMesh | None) -> Assessment:
+        return assess(
+            self._tracker,
+            shape,
+            self._settings,
+            self._refused,
+            lost=self.is_lost,
+            origin_height_m=self._origin_height_m,
+            has_ended=self._has_ended,
+        )
 
     @property
     def surface_grasps(self) -> NDArray[np.intp]:

@@ -29,6 +29,10 @@ BUTTONS: tuple[tuple[Ask, str, IconName, str], ...] = (
     (Ask.END, "End", Icon.PLAYER_STOP, "End the session; press twice"),
 )
 _ROWS = 8
+_MOST_TOLD = 3
+"""Doubts and alternatives that the panel has room for; the report has all."""
+
+_STATUS_COLOURS = {"complete": "#1a7f37", "partial": "#57606a", "ambiguous": "#9a6700", "lost": "#cf222e"}
 _SHOWN_s = 8.0
 PANEL_STYLE = "padding:0 0.9em 0.6em 0.9em;font-size:0.85em;line-height:1.45"
 
@@ -94,6 +98,7 @@ def status_html(scene: Scene) -> str:
         parts.append(line_html(f"Grasp {guide.get('grasp', '')}: {guide.get('stage', '')}", "font-weight:600"))
         parts.append(line_html(str(guide.get("prompt", "")), "font-size:1.15em;font-weight:600;color:#1f6feb"))
         parts.append(line_html(str(guide.get("capture", "")), "color:#57606a"))
+    parts.append(trust_html(scene))
     parts.append(forces_html(scene))
     facts = [
         ("pose", _pose(scene)),
@@ -107,6 +112,19 @@ def status_html(scene: Scene) -> str:
     if scene.surface is not None:
         parts.append(_scale())
     return f'<div style="{PANEL_STYLE}">{"".join(parts)}</div>'
+
+
+def trust_html(scene: Scene) -> str:
+    """What may be believed of the estimate: its status, and each doubt and alternative on a line; empty if unknown."""
+    told = scene.trust
+    if not told:
+        return ""
+    status, share = str(told.get("status", "")), told.get("known_share")
+    touched = "" if share is None else f", {share:.0%} of the shape touched"
+    parts = [banner(f"{status.capitalize()}{touched}", _STATUS_COLOURS.get(status, "#57606a"))]
+    parts += [line_html(f"• {words}", "") for words in told.get("doubts", [])[:_MOST_TOLD]]
+    parts += [line_html(f"or {words}", "color:#57606a") for words in told.get("alternatives", [])[:_MOST_TOLD]]
+    return "".join(parts)
 
 
 def forces_html(scene: Scene) -> str:

@@ -103,6 +103,12 @@ class Scene:
     changed: set[str] = field(default_factory=set)
 
     @property
+    def trust(self) -> dict[str, Any]:
+        """What may be believed of the newest estimate, as its message says; empty where it does not."""
+        newest = self.steps[max(self.steps)] if self.steps else {}
+        return newest if "status" in newest else {}
+
+    @property
     def next_plan(self) -> dict[str, Any]:
         """The plan, unless its grasp has been measured already."""
         measured = self.grasps[-1].index if self.grasps else -1

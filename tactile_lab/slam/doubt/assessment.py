@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tactile_lab.slam.doubt.halves import exchanged
 from tactile_lab.slam.doubt.known_part import known_part, with_guesses_told
 from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, turned_by_symmetry
 from tactile_lab.slam.doubt.signs import signs
@@ -54,16 +55,19 @@ def assess(
     *,
     lost: bool,
     origin_height_m: float,
+    has_ended: bool = True,
 ) -> Assessment:
-    """Assess a finished estimate.
+    """Assess an estimate.
 
     Args:
-        tracker: finished; None if no object frame was ever defined.
-        shape: the final outline or surface, object frame.
+        tracker: None if no object frame was ever defined.
+        shape: the outline or surface, object frame.
         settings: of the estimation.
         refused: of every grasp, whether it could not be placed.
         lost: whether the object could not be followed.
         origin_height_m: height of the object frame's origin over the table.
+        has_ended: no grasp follows. Before, only the trajectories that are still kept count as alternatives; at the
+            end more are searched for.
     """
     if tracker is None:
         return Assessment("lost", shape, None, (), ())
@@ -74,9 +78,13 @@ def assess(
         part = known_part(shape, contact_map.contacts, -origin_height_m if stands else None)
         shape, share = with_guesses_told(shape, part), part.share
     symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= LEAST_KNOWN_SHARE else None
-    others = _alternatives(tracker, contact_map, settings, shape, symmetry, origin_height_m)
+    if has_ended:
+        others = _alternatives(tracker, contact_map, settings, shape, symmetry, origin_height_m)
+    else:
+        others = _kept_alternatives(tracker, symmetry, origin_height_m)
     doubts = (
         *signs(contact_map, settings.motion, poses_given=settings.method == "known-pose"),
+        *(exchanged(contact_map) if has_ended else ()),
         *doubts_of(others),
         *_refused(refused),
         *_few(len(refused) - sum(refused)),
@@ -107,6 +115,13 @@ def _alternatives(
     if near is not None:
         found += turned_by_symmetry(contact_map, near, settings.motion, settings.joint.proposals.unexplained_cost)
     return alternatives(contact_map, found, symmetry, origin_height_m)
+
+
+def _kept_alternatives(tracker: Tracker, symmetry: Symmetry | None, origin_height_m: float) -> tuple[Alternative, ...]:
+    if not isinstance(tracker, JointTracker):
+        return ()
+    found = costs_above(tracker.hypotheses[0], tracker.contenders)
+    return alternatives(tracker.map, found, symmetry, origin_height_m)
 
 
 def _refused(refused: Sequence[bool]) -> list[Doubt]:

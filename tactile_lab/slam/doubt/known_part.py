@@ -80,13 +80,8 @@ def with_guesses_told(shape: _Shape, part: KnownPart) -> _Shape:
 
 def _outline(contour: Contour) -> tuple[Array, Array, Array]:
     """Points of an outline, their outward normals, and the length that belongs to each."""
-    points = contour.points_m
-    edges = np.roll(points, -1, axis=0) - points
-    lengths = np.linalg.norm(edges, axis=1)
-    outward = np.column_stack([edges[:, 1], -edges[:, 0]])  # counter-clockwise
-    both = outward + np.roll(outward, 1, axis=0)
-    normals = both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12)
-    return points, normals, (lengths + np.roll(lengths, 1)) / 2
+    lengths = np.linalg.norm(np.roll(contour.points_m, -1, axis=0) - contour.points_m, axis=1)
+    return contour.points_m, contour.normals, (lengths + np.roll(lengths, 1)) / 2
 
 
 def _surface(mesh: SurfaceMesh) -> tuple[Array, Array, Array]:

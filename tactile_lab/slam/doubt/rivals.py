@@ -72,6 +72,19 @@ def alternatives(
     return tuple(one for one in made if one.probability >= _LEAST_TOLD)
 
 
+def displaced(best: ContactMap, alternative: Alternative) -> ContactMap:
+    """The map with the grasps of an alternative at its poses.
+
+    Args:
+        best: the estimate.
+        alternative: to it.
+    """
+    rows = best.rows
+    for grasp, pose in zip(alternative.grasps, alternative.world_T_object, strict=True):
+        rows[grasp] = best.space.motion(pose)
+    return best.with_rows(rows)
+
+
 def turned_by_symmetry(
     best: ContactMap, symmetry: Symmetry, noise: MotionNoise, unexplained_cost: float
 ) -> list[tuple[ContactMap, float]]:

@@ -1,6 +1,7 @@
 """The default policy: the grasp with the most expected information about shape and pose together, per second.
 
-See :mod:`tactile_lab.slam.exploration.expected_information`.
+See :mod:`tactile_lab.slam.exploration.expected_information`. Where the estimate has alternatives, what a grasp tells
+about which of them is right counts too (:mod:`tactile_lab.slam.exploration.telling_apart`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from tactile_lab.slam.exploration.expected_information import (
     unexplored_vertices,
 )
 from tactile_lab.slam.exploration.policy import Belief, Decision, Surface, best_of, surface_to_foresee
+from tactile_lab.slam.exploration.telling_apart import told_apart
 
 _AHEAD = 3
 """Number of grasps by which a pose of the object is rated before it is carried there."""
@@ -36,7 +38,8 @@ class InformationPolicy:
         if isinstance(surface, Decision):
             return surface
         promise = predict_promise(candidates, belief, surface, self.settings, rng)
-        return self._decide(candidates, surface, belief, promise, rng)
+        apart = told_apart(candidates, belief, surface, self.settings.point_sigma_m, self.settings.execution.finger_m)
+        return self._decide(candidates, surface, belief, promise, apart, rng)
 
     def best_rate(
         self,
@@ -71,10 +74,11 @@ class InformationPolicy:
         surface: Surface,
         belief: Belief,
         promise: Promise,
+        apart: Array,
         rng: np.random.Generator,
     ) -> Decision:
         times = np.array([candidate.time_s for candidate in candidates])
-        nats = self.settings.pose_weight * promise.pose + promise.shape
+        nats = self.settings.pose_weight * promise.pose + promise.shape + apart
         rates = np.where(promise.touching > 0, self._worth(candidates, belief) * nats / times, -np.inf)
         decision = best_of(self.name, rates, "", rng)
         if decision.chosen is None:
@@ -82,7 +86,7 @@ class InformationPolicy:
         if why := self._stops(surface, belief, nats):
             return Decision(self.name, "stop", None, decision.scores, why)
         best = decision.chosen
-        reason = _reason(promise, best, candidates[best].pushes) + decision.reason
+        reason = _reason(promise, best, candidates[best].pushes) + _apart(apart[best], belief) + decision.reason
         return Decision(self.name, "grasp", best, decision.scores, reason, float(promise.new_share[best]))
 
     def _worth(self, candidates: Sequence[Candidate], belief: Belief) -> Array:
@@ -105,6 +109,14 @@ class InformationPolicy:
         if share < self.settings.enough:
             return ""
         return f"{100 * share:.0f} % of the surface has been touched and it is known to {1e3 * limit:.3g} mm"
+
+
+def _apart(nats: float, belief: Belief) -> str:
+    """What the chosen grasp tells about alternatives, for people; empty if there are none."""
+    if not belief.rivals:
+        return ""
+    chance = sum(rival.probability for rival in belief.rivals)
+    return f", {nats:.1f} nats about which placing is right ({chance:.0%} for another)"
 
 
 def _reason(promise: Promise, best: int, pushes: bool) -> str:

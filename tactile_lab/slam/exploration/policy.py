@@ -81,6 +81,23 @@ def _nothing_2d() -> Array:
 
 
 @dataclass(frozen=True)
+class RivalObject:
+    """The object as it is if an alternative to the estimate is right.
+
+    Attributes:
+        surface: in this alternative's object frame.
+        world_T_object: its pose on the table when the next grasp closes.
+        probability: of the alternative.
+        displaced: number of contacts that it places elsewhere.
+    """
+
+    surface: Surface
+    world_T_object: Pose2
+    probability: float
+    displaced: int
+
+
+@dataclass(frozen=True)
 class Belief:
     """The belief by which a grasp is chosen. Points are in the object frame, metres.
 
@@ -98,6 +115,7 @@ class Belief:
         missed_m: where contacts were expected and fingers met nothing, shape (k, d).
         origin_height_m: height of the object frame's origin over the table.
         grasps_left: how many grasps the session may still make; None for no limit.
+        rivals: the object under alternatives to the estimate.
     """
 
     field: Field
@@ -113,6 +131,7 @@ class Belief:
     missed_m: Array = default(default_factory=_nothing_2d)
     origin_height_m: float = 0.0
     grasps_left: int | None = None
+    rivals: tuple[RivalObject, ...] = ()
 
     @property
     def dimension(self) -> int:

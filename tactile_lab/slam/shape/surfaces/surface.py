@@ -46,6 +46,14 @@ class Contour:
     is_closed: bool
     known: Mask | None = None
 
+    @property
+    def normals(self) -> Array:
+        """Outward unit normals at the points, half way between those of both sides, shape (n, 2)."""
+        edges = np.roll(self.points_m, -1, axis=0) - self.points_m
+        outward = np.column_stack([edges[:, 1], -edges[:, 0]])  # counter-clockwise
+        both = outward + np.roll(outward, 1, axis=0)
+        return np.asarray(both / np.maximum(np.linalg.norm(both, axis=1, keepdims=True), 1e-12))
+
 
 @dataclass(frozen=True)
 class SurfaceMesh:

@@ -13,6 +13,7 @@ from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, F
 from drivers.core.errors import TrackingError
 from tactile_lab.slam.tracking.contacts.free_space import fingertip_places, places_on_line
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
+from tactile_lab.slam.tracking.contacts.shared_errors import NO_SHARED_ERRORS, SharedErrors
 
 LEAST_SIGMA_m, LEAST_SIGMA_rad = 1e-6, 1e-5
 """No contact is known better, whatever its covariance says: one that is known exactly has no finite weight."""
@@ -29,6 +30,7 @@ class ContactSet:
         normal_sigma_rad: standard deviation of each normal's direction, shape (n,).
         free_m: places known to be outside of the object when these contacts were made, shape (q, d), same frame.
         free_of: the contact whose finger was at each of them, -1 for a finger without contact, shape (q,).
+        shared: errors that contacts of one finger share.
     """
 
     points_m: Array
@@ -37,6 +39,7 @@ class ContactSet:
     normal_sigma_rad: Array
     free_m: Array = field(default_factory=lambda: np.empty((0, 0)))
     free_of: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    shared: SharedErrors = NO_SHARED_ERRORS
 
     def __len__(self) -> int:
         return len(self.points_m)
@@ -73,7 +76,7 @@ class ContactSet:
         normal_sigma = np.maximum(normal_sigma, LEAST_SIGMA_rad)
         seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
         free, free_of = _free_places(grasp, seen, counted, heights)
-        return replace(seen, free_m=free, free_of=free_of)
+        return replace(seen, free_m=free, free_of=free_of, shared=SharedErrors.of(counted, normals))
 
     @classmethod
     def concatenate(cls, parts: Sequence[ContactSet]) -> Self:
@@ -83,6 +86,7 @@ class ContactSet:
             np.concatenate([part.normals for part in parts]),
             np.concatenate([part.point_sigma_m for part in parts]),
             np.concatenate([part.normal_sigma_rad for part in parts]),
+            shared=SharedErrors.concatenate([part.shared.of_count(len(part)) for part in parts]),
         )
 
     def without_free_places(self) -> ContactSet:
@@ -97,12 +101,16 @@ class ContactSet:
             space: kind of the pose vectors.
         """
         points, normals = space.to_object(world_T_object, self.points_m, self.normals)
-        return ContactSet(points, normals, self.point_sigma_m, self.normal_sigma_rad)
+        return ContactSet(points, normals, self.point_sigma_m, self.normal_sigma_rad, shared=self.shared)
 
     def select(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> ContactSet:
         """The contacts picked by a boolean or index array."""
         return ContactSet(
-            self.points_m[mask], self.normals[mask], self.point_sigma_m[mask], self.normal_sigma_rad[mask]
+            self.points_m[mask],
+            self.normals[mask],
+            self.point_sigma_m[mask],
+            self.normal_sigma_rad[mask],
+            shared=self.shared.of_count(len(self)).select(mask),
         )
 
 

@@ -30,11 +30,14 @@ class FacetCertainty:
         information_of_poses: inverse of the joint covariance of all poses but the first, the faces known no better
             than contacts tell, shape (p, p).
         faces_by_poses: derivatives of each face's tilt and offset by those poses, shape (s d, p).
+        faces_by_fingers: change of each face's tilt and offset by one standard deviation of the error that contacts of
+            one finger share, while the poses adapt, shape (s d, fingers).
     """
 
     faces: FlatFaces
     information_of_poses: Array
     faces_by_poses: Array
+    faces_by_fingers: Array
 
     @classmethod
     def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
@@ -50,10 +53,19 @@ class FacetCertainty:
         free = (len(rows) - 1) * contact_map.space.size
         by_poses = -np.linalg.solve(information[free:, free:], information[free:, :free])
         of_poses = information[:free, :free] + information[:free, free:] @ by_poses
-        return cls(faces, np.asarray((of_poses + of_poses.T) / 2), np.asarray(by_poses))
+        by_fingers = smoother.response(rows, faces, contact_map.contacts_world.shared.displacements_m())[free:]
+        return cls(faces, np.asarray((of_poses + of_poses.T) / 2), np.asarray(by_poses), by_fingers)
 
     def surface_change(self, places_m: Array, normals: Array) -> Array:
         """Derivatives of points on the faces, shape (q, d), along their normals by the poses, shape (q, p)."""
+        return np.asarray(self._surface_by_faces(places_m, normals) @ self.faces_by_poses)
+
+    def shared_change(self, places_m: Array, normals: Array) -> Array:
+        """Displacement of such points by one standard deviation of each finger's error, shape (q, fingers)."""
+        return np.asarray(self._surface_by_faces(places_m, normals) @ self.faces_by_fingers)
+
+    def _surface_by_faces(self, places_m: Array, normals: Array) -> Array:
+        """Derivatives of points on the faces along their normals by each face's tilt and offset, shape (q, s d)."""
         count, dimension = self.faces.normals.shape
         away_m = np.abs(places_m @ self.faces.normals.T - self.faces.offsets_m)
         turned_rad = np.arccos(np.clip(normals @ self.faces.normals.T, -1.0, 1.0))
@@ -61,4 +73,4 @@ class FacetCertainty:
         levers = np.einsum("qdt,qd->qt", tangents(self.faces.normals)[face], places_m)
         by_faces = np.zeros((len(places_m), count, dimension))
         by_faces[np.arange(len(places_m)), face] = np.column_stack([-levers, np.ones(len(places_m))])
-        return np.asarray(by_faces.reshape(len(places_m), -1) @ self.faces_by_poses)
+        return by_faces.reshape(len(places_m), -1)

@@ -128,6 +128,21 @@ class FacetSmoother:
         at = self._rate(rows, faces)
         return self._information(at, self._jacobian(at))
 
+    def response(self, rows: Array, faces: FlatFaces, displacements_m: Array) -> Array:
+        """How poses but the first, and each face's tilt and offset, follow contacts that move along their normals.
+
+        Args:
+            rows, faces: the solution.
+            displacements_m: of the contacts, shape (n, m).
+
+        Returns:
+            Changes of these unknowns, shape (unknowns, m).
+        """
+        at = self._rate(rows, faces)
+        jacobian = self._jacobian(at)
+        moved = jacobian[: len(displacements_m)].T @ (displacements_m / self._world.point_sigma_m[:, None])
+        return np.asarray(-np.linalg.solve(self._information(at, jacobian), moved))
+
     def _rate(self, rows: Array, faces: FlatFaces) -> FacetedTrajectory:
         chi_square = float(np.sum(self._residuals(rows, faces) ** 2))
         return FacetedTrajectory(rows, faces, chi_square, self._motion.value(rows))

@@ -131,6 +131,11 @@ class JointTracker:
         return self._common_covariances
 
     @property
+    def contenders(self) -> tuple[Hypothesis, ...]:
+        """The kept hypotheses but the most likely one, with all their grasps."""
+        return tuple(replace(one, map=unfold(one.map)) for one in self._hypotheses[1:])
+
+    @property
     def rivals(self) -> tuple[Hypothesis, ...]:
         """At the end of a session: hypotheses that differ from the most likely one and were found less likely."""
         rivals = (*self._hypotheses[1:], *self._rivals) if self._has_ended else ()

@@ -8,11 +8,15 @@ heights those above each other too, and flat faces contacts all over the object.
 
 A motion of all contacts as one body changes the place of the shape and not the shape, so that part is removed: the
 result is the uncertainty of the surface after the best rigid alignment.
+
+Errors that all contacts of one finger share (:mod:`shared_errors`) are propagated in the same way, through the poses
+and the faces that adapt to them.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,7 +26,7 @@ from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.planar.polygon import Polygon
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, on_walls
-from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -30,25 +34,29 @@ from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
 from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
 
+_Extracted = TypeVar("_Extracted", Contour, SurfaceMesh)
+
 
 def propagate_pose_uncertainty(
-    mesh: SurfaceMesh, shape: FittedShape, contact_map: ContactMap, noise: MotionNoise
-) -> SurfaceMesh:
-    """A surface with the pose uncertainty added to its sigma.
+    extracted: _Extracted, shape: FittedShape, contact_map: ContactMap, noise: MotionNoise
+) -> _Extracted:
+    """An outline or surface with two more parts in its sigma: the poses', and what contacts of one finger share.
 
     Args:
-        mesh: of the shape.
+        extracted: of the shape.
         shape: what it was made from.
-        contact_map: the contacts in space at the poses of largest evidence; the first pose is given.
+        contact_map: the contacts at the poses of largest evidence; the first pose is given.
         noise: of the motion model.
     """
     if len(contact_map.placed) == 1:
-        return mesh
+        return extracted
+    places_m = extracted.points_m if isinstance(extracted, Contour) else extracted.vertices
+    normals = extracted.normals
     used = _walls(contact_map) if isinstance(shape, Prism) else contact_map
     axes = slice(0, used.dimension)
-    change = _change(used, noise, mesh.vertices[:, axes], mesh.normals[:, axes], faceted=_has_flat_faces(shape))
-    moved = _reshape(change, mesh, on_table=contact_map.space is PLANAR)
-    return replace(mesh, sigma_m=np.sqrt(mesh.sigma_m**2 + np.einsum("qm,qm->q", moved, moved)))
+    change = _change(used, noise, places_m[:, axes], normals[:, axes], faceted=_has_flat_faces(shape))
+    moved = _reshape(change, places_m, normals, on_table=contact_map.space is PLANAR)
+    return replace(extracted, sigma_m=np.sqrt(extracted.sigma_m**2 + np.einsum("qm,qm->q", moved, moved)))
 
 
 def _change(contact_map: ContactMap, noise: MotionNoise, places_m: Array, normals: Array, *, faceted: bool) -> Array:
@@ -60,24 +68,39 @@ def _change(contact_map: ContactMap, noise: MotionNoise, places_m: Array, normal
         places_m, normals: of the surface, shape (q, d); in the plane normals are shorter where it is inclined.
         faceted: the object has flat faces.
     """
-    if faceted:
-        try:
-            certainty = FacetCertainty.of(contact_map, noise)
-        except ShapeError:  # the contacts enclose nothing without the rest: what the field binds is all there is
-            return _change(contact_map, noise, places_m, normals, faceted=False)
+    try:
+        certainty: FacetCertainty | None = FacetCertainty.of(contact_map, noise)
+    except (ShapeError, np.linalg.LinAlgError):  # the contacts enclose nothing without the rest
+        certainty = None
+    if faceted and certainty is not None:
         information, change = certainty.information_of_poses, certainty.surface_change(places_m, normals)
     else:
         evidence = PoseEvidence(contact_map, noise)
         information, change = evidence.information(contact_map.rows), evidence.field_change(contact_map.rows, places_m)
     root = np.linalg.inv(np.linalg.cholesky(information)).T
-    return np.asarray(change @ root * np.linalg.norm(normals, axis=1, keepdims=True))
+    shared = _shared_change(contact_map, certainty, places_m, normals)
+    return np.asarray(np.hstack([change @ root, shared]) * np.linalg.norm(normals, axis=1, keepdims=True))
 
 
-def _reshape(change: Array, mesh: SurfaceMesh, *, on_table: bool) -> Array:
-    """Displacements along the normals after the best rigid motion of the surface is removed."""
-    arms, normals = mesh.vertices - mesh.vertices.mean(axis=0), mesh.normals
-    turning = np.cross(arms, normals)
-    rigid = np.column_stack([normals[:, :2], turning[:, 2]] if on_table else [normals, turning])
+def _shared_change(contact_map: ContactMap, certainty: FacetCertainty | None, places_m: Array, normals: Array) -> Array:
+    """Displacement of a surface by what the contacts of each finger share, shape (q, fingers).
+
+    Where no faces say how the poses adapt, each finger counts by its number of contacts all over the object.
+    """
+    if certainty is not None:
+        return certainty.shared_change(places_m, normals)
+    alike = contact_map.contacts_world.shared.displacements_m().mean(axis=0)
+    return np.tile(alike, (len(places_m), 1))
+
+
+def _reshape(change: Array, places_m: Array, normals: Array, *, on_table: bool) -> Array:
+    """Displacements along the normals, shape (q, m), after the best rigid motion of the surface is removed."""
+    arms = places_m - places_m.mean(axis=0)
+    if places_m.shape[1] == 2:
+        rigid = np.column_stack([normals, arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]])
+    else:
+        turning = np.cross(arms, normals)
+        rigid = np.column_stack([normals[:, :2], turning[:, 2]] if on_table else [normals, turning])
     return np.asarray(change - rigid @ np.linalg.lstsq(rigid, change, rcond=None)[0])
 
 
@@ -97,5 +120,6 @@ def _project_down(grasp: PlacedGrasp) -> PlacedGrasp:
     kept = grasp.kept_world
     walls = kept.select(on_walls(kept.normals))
     level = walls.normals[:, :2] / np.linalg.norm(walls.normals[:, :2], axis=1, keepdims=True)
-    flat = ContactSet(walls.points_m[:, :2], level, walls.point_sigma_m, walls.normal_sigma_rad, np.empty((0, 2)))
+    given = walls.points_m[:, :2], level, walls.point_sigma_m, walls.normal_sigma_rad, np.empty((0, 2))
+    flat = ContactSet(*given, shared=walls.shared)
     return replace(grasp, contacts_world=flat, left_out=frozenset())

@@ -62,3 +62,27 @@ def test_a_saturated_reading_is_void(tip: ForceTip) -> None:
 def test_nothing_is_told_before_the_first_reading() -> None:
     sensor = ForceTip("FF", load_fingertips(load_rig("sim").files["fingertips"])["FF"], ForceTipSettings())
     assert np.isnan(sensor.reading()).all()
+
+
+def test_a_skin_that_yields_is_touched_inside_its_ellipsoid_by_captures_and_at_any_moment_alike(tip: ForceTip) -> None:
+    stiff = tip.calibration.model_copy(update={"yield_m": 0.0})
+    soft = tip.calibration.model_copy(update={"yield_m": 0.001, "yield_exponent": 0.5})
+    force_N = float(np.linalg.norm((PRESSED - STILL)[:3]))
+    points = {}
+    for name, calibration in (("stiff", stiff), ("soft", soft)):
+        sensor = ForceTip("FF", calibration, ForceTipSettings())
+        feel(sensor, STILL)
+        sensor.tare(np.eye(3))
+        sensor.begin_capture()
+        feel(sensor, PRESSED)
+        captured = sensor.contact(np.eye(3))
+        assert captured is not None
+        at_any = sensor.touches(sensor.reading()[None], np.eye(3)[None]).points_distal_m[0]
+        np.testing.assert_allclose(at_any, captured.point_distal_m, atol=1e-5)
+        points[name], into_tip = captured.point_distal_m, captured.normal_distal
+    indented_m = (points["soft"] - points["stiff"]) @ into_tip
+    assert indented_m == pytest.approx(0.001 * force_N**0.5, rel=0.01)
+
+
+def test_a_force_that_pulls_presses_nothing_in(tip: ForceTip) -> None:
+    assert tip.calibration.indentation_m(np.array([-0.5, 0.0])).tolist() == [0.0, 0.0]

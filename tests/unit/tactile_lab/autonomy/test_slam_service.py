@@ -9,6 +9,8 @@ from gtsam import Pose3
 
 from tactile_lab.autonomy.slam_service import KEPT_STATES, SlamMemory, SlamService
 from tactile_lab.experiments.data.planar_data import simulate
+from tactile_lab.slam.doubt.assessment import Assessment
+from tactile_lab.slam.doubt.status import Alternative, Doubt
 from tactile_lab.slam.tactile_slam import TactileSlam
 
 
@@ -20,6 +22,11 @@ class Nothing:
 
     def known_shape(self) -> None:
         """Nothing is known."""
+
+    def assessment(self) -> Assessment:
+        """A part is believed."""
+        doubt = Doubt("few-grasps", "only 1 grasp could be placed", grave=False)
+        return Assessment("partial", None, 0.4, (doubt,), (Alternative((0,), (Pose3(),), 0.12, 1.0, 0.03, 0.01),))
 
     def on_undo(self, hand_motion_world: Pose3) -> None:
         """Nothing is noted."""
@@ -37,6 +44,14 @@ def test_the_object_is_told_where_its_surface_is() -> None:
         followed = slam._tracker.map.placed[-1].row if slam._tracker else None
         moved.append(followed is not None and abs(told.x() - followed[0]) > 1e-6)
     assert any(moved)  # the surface's contacts are smoothed with faces, beside the trajectory that is followed
+
+
+def test_what_may_be_believed_comes_with_every_estimate() -> None:
+    service = SlamService(TactileSlam(seed=0), Nothing())  # type: ignore[arg-type]
+    (told,) = service.estimate(simulate("rectangle", 50, count=1).grasps[0], 0)
+    assert (told.trust["status"], told.trust["known_share"]) == ("partial", 0.4)
+    assert told.trust["doubts"] == ["only 1 grasp could be placed"]
+    assert told.trust["alternatives"] == ["grasp 1 turned by 57° and moved by 30 mm (12%)"]
 
 
 def test_grasps_are_taken_back_farther_than_states_are_kept() -> None:

@@ -151,6 +151,28 @@ def test_plan_is_shown_until_its_grasp_is_measured() -> None:
     assert recorded(grasps=3).next_plan == {}
 
 
+def test_the_panel_says_what_may_be_believed_of_the_newest_estimate_only() -> None:
+    sink = SceneSink()
+    recorder = Recorder(sink)
+    trust = {
+        "status": "ambiguous",
+        "known_share": 0.62,
+        "doubts": ["the slip before grasp 2 is <improbable>"],
+        "alternatives": ["grasp 2 turned by 60° and moved by 30 mm (12%)"],
+    }
+    recorder.slam(1, Pose3(), {"index": 0, **trust}, np.eye(3))
+    shown = status_html(sink.scene)
+    assert "Ambiguous, 62% of the shape touched" in shown
+    assert "&lt;improbable&gt;" in shown
+    assert "turned by 60°" in shown
+    recorder.slam(2, Pose3(), {"index": 1, "status": "complete", "known_share": None}, np.eye(3))
+    shown = status_html(sink.scene)
+    assert "Complete<" in shown
+    assert "improbable" not in shown
+    recorder.slam(3, Pose3(), {"index": 2}, np.eye(3))
+    assert "Complete" not in status_html(sink.scene)
+
+
 def test_fingers_bend_where_their_bones_meet() -> None:
     joints_rad = joint_vector({"FFJ3": 0.4, "FFJ2": 0.7, "FFJ1": 0.3, "MFJ2": 0.2})
     lines_m = bones(Pose3(), palm_T_distal(joints_rad))
