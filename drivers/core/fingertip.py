@@ -97,6 +97,16 @@ class ContinuousFingertip(Protocol):
     def touches(self, readings: Array, world_R_distal: Array) -> TipTouches:
         """The contacts of readings of shape (n, 6), with the distal frame's orientation at each, shape (n, 3, 3)."""
 
+    def wrenches(self, readings: Array, world_R_distal: Array) -> Array:
+        """The object's wrench on the fingertip, about the distal frame's origin and along its axes, shape (n, 6).
+
+        NaN for a reading that is no measurement.
+        """
+
+    @property
+    def drift(self) -> Array:
+        """Drift of the readings since the tare, one standard deviation, N and N m, shape (6,)."""
+
 
 class FingertipSensor(Protocol):
     """A fingertip of any kind. Each kind has its own ``update`` for its decoded samples.

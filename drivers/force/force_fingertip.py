@@ -181,6 +181,19 @@ class ForceTip:
         wrenches = (np.where(is_void[:, None], 0.0, readings - weights)) @ self._to_centre.T
         return tip_touches(wrenches, is_void, self.calibration, self._settings.plausibility)
 
+    def wrenches(self, readings: Array, world_R_distal: Array) -> Array:
+        """See :meth:`~drivers.core.fingertip.ContinuousFingertip.wrenches`."""
+        weights = -world_R_distal[:, 2] @ self._weight_from_down.T
+        about_centre = (readings - weights) @ self._to_centre.T
+        arms = np.cross(np.array(self.calibration.centre_distal_m), about_centre[:, :3])
+        return np.hstack([about_centre[:, :3], about_centre[:, 3:] + arms])
+
+    @property
+    def drift(self) -> Array:
+        """See :meth:`~drivers.core.fingertip.ContinuousFingertip.drift`."""
+        known = self.calibration
+        return np.repeat([known.force_drift_N, known.moment_drift_Nm], 3)
+
     def health(self) -> tuple[str, ...]:
         """What is wrong with the sensor, in words; empty when all is well."""
         problems = self._reports(self.newest) if self.newest else ["no sample received yet"]

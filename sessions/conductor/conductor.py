@@ -17,7 +17,7 @@ from sessions.conductor.object_gone import blocked, lost, not_found
 from sessions.conductor.progress import GraspReport, NullProgress, Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.conductor.settings import ConductorSettings
-from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.grasp_plan import GraspPlan, holds
 from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
@@ -42,7 +42,7 @@ class Conductor:
         self._runtime, self._settings = runtime, settings
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = roles.supervisor, roles.performer, roles.decisions
-        self._survey, self._guard = roles.survey, roles.guard
+        self._survey, self._guard, self._weigh = roles.survey, roles.guard, roles.weigh
         self._guard.heard = self._progress.on_interrupt
         self._estimation = Estimation(runtime, roles.estimator)
         self._prepared: int | None = None
@@ -163,7 +163,8 @@ class Conductor:
         self._runtime.log(Level.ERROR if error else Level.INFO, "conductor", f"{ending}: {text}")
         for note in getattr(error, "__notes__", ()):
             self._runtime.log(Level.ERROR, "conductor", note)
-        return SessionOutcome(ending, text, tuple(self._grasps), dict(self._runtime.perception.drop_counts), error)
+        seen = self._runtime.perception
+        return SessionOutcome(ending, text, tuple(self._grasps), dict(seen.drop_counts), error, seen.properties)
 
     # --- one grasp ---------------------------------------------------------------------------------------------
 
@@ -248,6 +249,9 @@ class Conductor:
         self._supervisor.count_contacts(len(grasp.contacts))
         hand_motion = Pose3()
         last = len(self._grasps) >= self._settings.grasps or self._guard.requested
+        if holds(touching) and len(self._grasps) <= self._settings.weighings and not self._guard.requested:
+            self._weigh_object(touching)
+            hand_motion = self._tell_carry() or hand_motion
         if wanted.moves and holds(touching) and not last:
             self._phase("squeeze")
             cycle.squeeze(touching)
@@ -257,6 +261,18 @@ class Conductor:
                 self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: re-orientation stopped early")
             hand_motion = self._tell_carry() or hand_motion
         self._decisions.on_carry(hand_motion)
+
+    def _weigh_object(self, touching: frozenset[str]) -> None:
+        """Weigh the held object, if this session can and nobody objects."""
+        if self._weigh is None:
+            return
+        if not self._decisions.may_weigh(self._cycle.plan):
+            self._tell(Level.INFO, "the object is not weighed")
+            return
+        self._phase("weigh")
+        end = self._weigh(touching)
+        known = self._runtime.perception.properties.in_words()
+        self._tell(Level.INFO, f"weighed: {end}; {known}")
 
     def _tell_carry(self) -> Pose3 | None:
         """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""
@@ -302,8 +318,3 @@ class Conductor:
     def _tell(self, level: Level, message: str) -> None:
         self._runtime.log(level, "conductor", message)
         self._progress.on_message(message)
-
-
-def holds(touching: frozenset[str]) -> bool:
-    """Whether these fingers can carry the object: the thumb against another, or both side fingers."""
-    return ("TH" in touching and len(touching) > 1) or {"FF", "LF"} <= touching

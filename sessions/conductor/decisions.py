@@ -19,6 +19,7 @@ from sessions.conductor.estimator_client import EstimatorClient
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.safety import InterruptGuard, SafetySupervisor
+from sessions.motion.weighing import LiftEnd
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,9 @@ class DecisionMaker(Protocol):
     def on_capture(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
         """A grasp was measured at ``plan``. Returns how to carry the object now, or why the grasp is discarded."""
 
+    def may_weigh(self, plan: GraspPlan) -> bool:
+        """Whether the object held at ``plan`` may be dragged and lifted a little."""
+
     def on_carry(self, hand_motion_world: Pose3) -> None:
         """The hand carried the object since the grasp."""
 
@@ -143,6 +147,7 @@ class SessionRoles:
         performer: executes the grasps.
         decisions: decides about them.
         estimator: client of estimator and planner; open while the session runs.
+        weigh: drags and lifts the object that these fingers hold; None for a session that cannot.
         survey: measures the object's bounding box before the first grasp; its argument tells whether to skip the rest.
             None for a session without it.
         guard: receives Ctrl+C while the session runs; code that waits for a person checks it.
@@ -152,6 +157,7 @@ class SessionRoles:
     performer: Performer
     decisions: DecisionMaker
     estimator: EstimatorClient
+    weigh: Callable[[frozenset[str]], LiftEnd] | None = None
     survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
     guard: InterruptGuard = field(default_factory=InterruptGuard)
 
@@ -197,6 +203,9 @@ class AutonomousDecisions:
     def on_capture(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
         self._centre_m = None
         return self.estimator.ask(EstimatorService.on_grasp, grasp, plan)
+
+    def may_weigh(self, plan: GraspPlan) -> bool:
+        return True
 
     def on_carry(self, hand_motion_world: Pose3) -> None:
         self._centre_m = None

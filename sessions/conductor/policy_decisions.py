@@ -22,12 +22,14 @@ class Proposal:
         number: from 1.
         plan: the grasp and its reason.
         vetoed: number of plans for this grasp vetoed so far.
+        weighs: the object is held at this plan already, and would be dragged and lifted a little.
         withdrawn: whether the answer no longer matters because Ctrl+C ends the session.
     """
 
     number: int
     plan: GraspPlan
     vetoed: int = 0
+    weighs: bool = False
     withdrawn: Callable[[], bool] = lambda: False
 
 
@@ -70,9 +72,17 @@ class PolicyDecisions(AutonomousDecisions):
 
     def _is_approved(self, index: int, vetoed: int) -> bool:
         """Whether the person, if one is asked, approves the planned grasp."""
-        if self._planned is None or self._approve is approve_everything:
+        if self._planned is None:
             return True
-        proposal = Proposal(index + 1, self._planned.plan, vetoed, lambda: self._guard.requested)
+        return self._asked(Proposal(index + 1, self._planned.plan, vetoed, withdrawn=lambda: self._guard.requested))
+
+    def may_weigh(self, plan: GraspPlan) -> bool:
+        return self._asked(Proposal(0, plan, weighs=True, withdrawn=lambda: self._guard.requested))
+
+    def _asked(self, proposal: Proposal) -> bool:
+        """Whether the person agrees, if one is asked."""
+        if self._approve is approve_everything:
+            return True
         return self.estimator.wait_for_person(lambda: self._approve(proposal))
 
     def decide(self, index: int) -> Decision:

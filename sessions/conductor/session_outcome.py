@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 from drivers.core.contacts import Grasp
 from drivers.core.errors import TactileLabError
+from sessions.perception.weighing.object_properties import ObjectProperties
 
 
 class Ending(StrEnum):
@@ -32,6 +33,7 @@ class SessionOutcome:
         grasps: all captured grasps, in order.
         dropped: how often a finger's contact was rejected, by reason.
         error: what stopped the session, if something did.
+        properties: mass, centre and friction of the object, as far as they were measured.
     """
 
     ending: Ending
@@ -39,3 +41,4 @@ class SessionOutcome:
     grasps: tuple[Grasp, ...]
     dropped: dict[str, int]
     error: TactileLabError | None = None
+    properties: ObjectProperties = field(default_factory=ObjectProperties)

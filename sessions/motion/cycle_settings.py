@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from drivers.core.configuration import StrictModel
+from sessions.motion.weighing import WeighingSettings
 
 
 class TouchSettings(StrictModel):
@@ -82,11 +83,14 @@ class CycleSettings(StrictModel):
         squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
+        ease_force_N: force of each finger when a carried object is let go; the thumb balances the others.
+        ease_s: time in which the squeeze goes down to it.
         pressed_N: force on a fingertip above which no other finger presses harder.
         pressed_cycles: cycles in a row with that force after which re-orientation stops.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind would leave the path.
         touch: taps on the top and probes from the side.
+        weighing: how a held object is weighed.
         finger_gap_m: the thumb stops at this distance from another tip's centre, before they touch each other.
     """
 
@@ -114,10 +118,13 @@ class CycleSettings(StrictModel):
     squeeze_force_N: float = Field(default=0.8, gt=0.0)
     squeeze_s: float = Field(default=0.5, gt=0.0)
     squeeze_gain: float = Field(default=0.02, gt=0.0)
+    ease_force_N: float = Field(default=0.15, gt=0.0)
+    ease_s: float = Field(default=0.4, gt=0.0)
     pressed_N: float = Field(default=3.5, gt=0.0)
     pressed_cycles: int = Field(default=5, ge=1)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
     finger_rad_s: float = Field(default=1.8, gt=0.0)
     touch: TouchSettings = TouchSettings()
+    weighing: WeighingSettings = WeighingSettings()
     finger_gap_m: float = Field(default=0.021, ge=0.0)

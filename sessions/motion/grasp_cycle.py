@@ -18,9 +18,12 @@ from sessions.motion.guard import Guard
 from sessions.motion.motion import GraspFrame, Motion
 from sessions.motion.side_survey import LOW_m
 from sessions.motion.touching import SideTouch, Toucher, travel_height_m
+from sessions.motion.weighing import Grip, LiftEnd, Weigher
 
 _HASTE_N, _FLIGHT_N = 1.0, 3.0
 """Limits of the force error in force control: toward the object, and away from it."""
+_LEAST_HOLD_N = 0.1
+"""A fingertip that presses less holds nothing."""
 
 
 class GraspCycle:
@@ -285,9 +288,33 @@ class GraspCycle:
         if self.jammed:
             self._build_up(targets_N, self.settings.squeeze_s)
         motion.wait(self.settings.rest_s)
+        self._ease(touching)
         motion.runtime.end_hold()
         self._plan = replace(self.plan, frame=frame_at(share))
         return motion.runtime.perception.world_T_palm * world_T_before.inverse()
+
+    def weigh(self, touching: frozenset[str]) -> LiftEnd:
+        """Drag, lift and set down the object that these fingers hold; the runtime's perception knows what was found."""
+        grip = Grip(
+            hold=lambda force_N: self._servo_forces(self._balanced_forces_N(touching, force_N)),
+            holding=lambda: frozenset(self._pressed_fingers(_LEAST_HOLD_N)),
+            is_pressed=lambda: bool(self._pressed_fingers(self.settings.pressed_N)),
+        )
+        end = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
+        self._ease(touching)
+        self._motion.runtime.end_hold()
+        return end
+
+    def _ease(self, touching: frozenset[str]) -> None:
+        """Press less and less, all fingers together, while the object is still felt.
+
+        The fingers open at different speeds and leave one after the other: what still presses then pushes the object.
+        """
+        s = self.settings
+        for share in self._motion.shares(s.ease_s):
+            force_N = s.squeeze_force_N + share * (s.ease_force_N - s.squeeze_force_N)
+            self._servo_forces(self._balanced_forces_N(touching, force_N))
+            self._motion.tick()
 
     def _balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
         """Force of each finger; the thumb balances the others' forces along the grasp's x axis."""

@@ -81,3 +81,8 @@ def _turn_away(frame: GraspFrame, yaw_window_rad: tuple[float, float]) -> GraspF
     low, high = yaw_window_rad
     turn = -np.pi / 2 if frame.yaw_rad > (low + high) / 2 else np.pi / 2
     return replace(frame, yaw_rad=float(np.clip(frame.yaw_rad + turn, low, high)))
+
+
+def holds(touching: frozenset[str]) -> bool:
+    """Whether these fingers can carry the object: the thumb against another, or both side fingers."""
+    return ("TH" in touching and len(touching) > 1) or {"FF", "LF"} <= touching

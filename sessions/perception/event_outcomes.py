@@ -1,4 +1,4 @@
-"""What a session event completes: a grasp, a picture that shows the truth, a tare, or an undo."""
+"""What a session event completes: a grasp, a picture that shows the truth, a tare, an undo, or a weighing."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from drivers.core.contacts import Grasp
 from sessions.perception.instruments import FrameReading
+from sessions.perception.weighing.weighing import Dragging, Hanging
 
 
 @dataclass(frozen=True)
@@ -38,4 +39,4 @@ class Undone:
     index: int
 
 
-Outcome: TypeAlias = Grasp | TruthFrame | TareReport | Undone
+Outcome: TypeAlias = Grasp | TruthFrame | TareReport | Undone | Dragging | Hanging

@@ -29,6 +29,9 @@ from sessions.perception.hand_odometry import HandOdometry
 from sessions.perception.hand_placement import HandPlacement
 from sessions.perception.instruments import BaseReading, FrameReading, HandReading, SlotFingertip, WrenchFingertip
 from sessions.perception.touch_capture import Capture, Measured, Probed, TouchSelection
+from sessions.perception.weighing.net_wrench import upward_N
+from sessions.perception.weighing.object_properties import ObjectProperties
+from sessions.perception.weighing.scales import Scales
 from sessions.recording.session_events import EventKind, SessionEvent
 
 
@@ -97,6 +100,7 @@ class Perception:
         self._carried = HandOdometry()
         felt = self.fingertips if self.settings.odometry == "touch" else {}
         self._carrying = HeldObject(felt, form.side, self.settings.odometry_scale)
+        self._scales = Scales(self._carrying, form.side, self.settings.joint_sigma_rad)
 
     # --- samples -----------------------------------------------------------------------------------------------
 
@@ -156,6 +160,15 @@ class Perception:
     def carry(self) -> Carry | None:
         """What the fingertips felt in the last completed hold; None if they felt nothing that tells."""
         return self._carrying.carry
+
+    @property
+    def properties(self) -> ObjectProperties:
+        """Mass, centre and friction of the object, as far as they were measured."""
+        return self._scales.properties
+
+    def held_N(self) -> float:
+        """Upward force of the fingertips on the object now; 0 where they tell nothing while they move."""
+        return upward_N(self._carrying.fingertips, self._placement.current().world_T_distal[:, :3, :3])
 
     @property
     def joints_rad(self) -> Array:
@@ -255,12 +268,20 @@ class Perception:
                 self._probed = Probed()
                 return None
             case EventKind.HOLD_END:
-                self._carried.end(self.world_T_palm, self._carrying.end_hold())
+                self._end_hold()
                 return None
             case EventKind.TRUTH_FRAME:
                 return self._truth_frame()
             case EventKind.UNDO:
                 return self._undo()
+            case _:
+                return self._scales.event(event, self.grasp_count - 1)
+
+    def _end_hold(self) -> None:
+        carry = self._carrying.end_hold()
+        self._carried.end(self.world_T_palm, carry)
+        if carry is not None:
+            self.properties.sliding.append((self.grasp_count - 1, carry.sliding))
 
     def _tare(self, event: SessionEvent) -> TareReport:
         self._placement.latest()
@@ -331,4 +352,5 @@ class Perception:
     def _undo(self) -> Undone:
         self._carried.undo()
         self._capture = None
+        self.properties.undo(self.grasp_count)
         return Undone(self.grasp_count)

@@ -32,6 +32,7 @@ from sessions.perception.instruments import (
 )
 from sessions.perception.interpreter import HAND_LINK, Observer, fingertip_link
 from sessions.perception.perception import Perception
+from sessions.perception.weighing.weighing import Dragging, Hanging
 from sessions.recording.recorder import Level, Recorder
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.rig_runtime.cycle_timing import CycleCounts, CycleTiming
@@ -255,6 +256,26 @@ class RigRuntime:
     def end_hold(self) -> None:
         """From now on the object stays in place."""
         self._record_event(EventKind.HOLD_END)
+
+    def begin_dragging(self) -> None:
+        """From now on the held object is dragged to and fro over the table."""
+        self._record_event(EventKind.DRAG_BEGIN)
+
+    def end_dragging(self) -> Dragging | None:
+        """Compute the table's friction; None if the fingertips told nothing."""
+        found = self._record_event(EventKind.DRAG_END)
+        assert found is None or isinstance(found, Dragging)
+        return found
+
+    def begin_hanging(self) -> None:
+        """From now on the lifted object is shifted to and fro."""
+        self._record_event(EventKind.HANG_BEGIN)
+
+    def end_hanging(self) -> Hanging | None:
+        """Compute the object's weight; None if the fingertips told nothing."""
+        found = self._record_event(EventKind.HANG_END)
+        assert found is None or isinstance(found, Hanging)
+        return found
 
     def picture(self, cycle: Callable[[], None] | None = None) -> FrameReading:
         """Take a picture; cycles continue until it arrives.

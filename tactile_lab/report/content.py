@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.core.poses import rotate, transform_points
+from sessions.perception.weighing.object_properties import Value
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.evaluation.files.tables import ContactRows
 from tactile_lab.evaluation.trajectory import estimate_T_truth
@@ -108,6 +109,7 @@ class ReportContent:
         contour_sigma_m: standard deviation at each point of the contour, shape (n,); NaN where it is a guess.
         truth: ground truth, or None.
         fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
+        mass_kg: of the object as it was weighed, or None.
         course: decisions and stops of the session.
         camera: the marker camera's last picture of a grasp, or None.
         camera_problem: why there is none, "" for a session without camera.
@@ -121,6 +123,7 @@ class ReportContent:
     contour_sigma_m: Array = field(default_factory=lambda: np.zeros(0))
     truth: TrueShape | None = None
     fitted_outline_m: Array | None = None
+    mass_kg: Value | None = None
     course: Course = field(default_factory=Course)
     camera: CameraView | None = None
     camera_problem: str = ""

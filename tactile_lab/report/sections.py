@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from sessions.perception.weighing.object_properties import Value
 from tactile_lab.evaluation.table import UNKNOWN
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent, Surface
@@ -78,6 +79,7 @@ def key_figures(content: ReportContent) -> Markup:
         ("Mean distance", number(shape.get("mean_distance_mm")), "mm", _best(best.get("mean_distance_mm"))),
         ("F-score at 1 mm", number(shape.get("fscore_1mm"), 3), "", _best(best.get("fscore_1mm"), 3, "")),
         *_size_tiles(evaluation.get("dimensions") or ()),
+        *_mass_tile(content.mass_kg),
         ("Position error", number(pose.get("rmse_mm")), "mm", _at_end(pose, "final_mm")),
         ("Rotation error", number(pose.get("rmse_deg")), "°", _at_end(pose, "final_deg")),
         ("Grasps", str(grasps), "", f"{placed} placed, {contacts} contacts"),
@@ -97,6 +99,13 @@ def _size_tiles(extents: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, st
         )
         for extent in extents
     ]
+
+
+def _mass_tile(mass_kg: Value | None) -> list[tuple[str, str, str, str]]:
+    if mass_kg is None:
+        return []
+    told = f"{1e3 * mass_kg.value:.0f} \u00b1 {2e3 * mass_kg.sigma:.0f}"
+    return [("Mass", told, "g", "as weighed; two standard deviations")]
 
 
 def _tile(name: str, value: str, unit: str, under: str) -> Markup:

@@ -17,11 +17,13 @@ from drivers.core.contacts import Grasp
 from drivers.core.errors import SessionError, TactileLabError
 from sessions.conductor.progress import NullProgress, Progress
 from sessions.conductor.session_outcome import SessionOutcome
+from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.recording.session import RESULTS, Session
 from sessions.recording.traffic.reader import Loss
 from tactile_lab import report
 from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate
+from tactile_lab.evaluation.files.properties_file import PROPERTIES, write_properties
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.files.results import read_results
 from tactile_lab.evaluation.files.trajectory_file import Trajectory, trajectory_text
@@ -32,7 +34,8 @@ from tactile_lab.slam.tactile_slam import TactileSlam
 
 EVALUATION = "evaluation.json"
 _KNOWN = ("known.csv", "known.ply")
-REPLAYABLE = ("trajectory.csv", "contacts.csv", "contour.csv", "mesh.ply", "mesh.glb", *_KNOWN, "slam.json")
+_MODEL = ("contour.csv", "mesh.ply", "mesh.glb", *_KNOWN, PROPERTIES)
+REPLAYABLE = ("trajectory.csv", "contacts.csv", *_MODEL, "slam.json")
 """Result files that a replay of the same session reproduces, byte for byte."""
 RESULT_FILES = (*REPLAYABLE, "timing.json", TRUTH_TRAJECTORY, EVALUATION, report.REPORT)
 """All files of a results folder."""
@@ -145,14 +148,29 @@ def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress
         slam.add_grasp(grasp)
 
 
-def finish(session: Session, rig: Rig, slam: TactileSlam, grasps: Sequence[Grasp], out: Path) -> FinishedSession:
-    """Finish the estimation and write model, evaluation and report; an error is stored in the returned record."""
+def finish(
+    session: Session,
+    rig: Rig,
+    slam: TactileSlam,
+    grasps: Sequence[Grasp],
+    out: Path,
+    properties: ObjectProperties | None = None,
+) -> FinishedSession:
+    """Finish the estimation and write model, evaluation and report; an error is stored in the returned record.
+
+    Args:
+        session, rig, slam, grasps: what was recorded, and what estimates from it.
+        out: folder of the results.
+        properties: what was measured of the object's mass and friction.
+    """
     remove_results(out)
     if not grasps:
         return FinishedSession(session.folder, out, problem="no grasp was recorded")
     try:
         wanted = slam.settings
-        write_results(out, slam.finish(), grasps, wanted.model_dump(mode="json"), wanted.largest_sigma_m)
+        result = slam.finish()
+        write_results(out, result, grasps, wanted.model_dump(mode="json"), wanted.largest_sigma_m)
+        write_properties(out, properties or ObjectProperties(), result.world_T_object)
         evaluation, _ = _write_evaluation(session, rig, out)
         report.write(session.folder, out)
     except TactileLabError as error:

@@ -54,7 +54,8 @@ def replay_session(
         raise ConfigurationError("contains the session's own results", where=str(out), hint=hint)
     check_replaceable(out)
     rig = rig_of_session(session)
-    replay = Replay(session, build_interpreter(rig), speed)
+    interpreter = build_interpreter(rig)
+    replay = Replay(session, interpreter, speed)
     progress = progress or NullProgress()
     progress.phase(0, "read")
     grasps = kept_grasps(replay.outcomes())
@@ -62,7 +63,7 @@ def replay_session(
     slam = TactileSlam(settings, seed, known_poses)
     estimate_rest(slam, grasps, progress)
     progress.phase(len(grasps), "model and evaluation")
-    finished = finish(session, rig, slam, grasps, out)
+    finished = finish(session, rig, slam, grasps, out, interpreter.perception.properties)
     unread = _unread(replay.loss, len(grasps), session.manifest.counts.get("grasps"))
     return replace(finished, data_loss=session.manifest.data_loss, unread=unread, read_factor=replay.factor)
 

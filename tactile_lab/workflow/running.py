@@ -50,6 +50,7 @@ class SessionRequest:
         notes: the operator's.
         policy: name of the exploration policy; the rig's own way of choosing when None.
         bounding_box: feel the object's bounding box before the first grasp.
+        weighings: in how many of the first grasps the held object is dragged and lifted a little, to weigh it.
         allow_uncalibrated: start even if a calibration is missing, expired, failed or of another rig; the session
             records it.
     """
@@ -65,6 +66,7 @@ class SessionRequest:
     allow_uncalibrated: bool = False
     policy: str | None = None
     bounding_box: bool = False
+    weighings: int = 0
 
 
 def slam_settings(method: str, dimension: int, motion: MotionNoise) -> SlamSettings:
@@ -132,7 +134,7 @@ def _evaluate(session: RunningSession, rig: Rig, slam: TactileSlam, outcome: Ses
     if isinstance(outcome.error, EstimationError):
         return FinishedSession(session.folder, session.results, problem=str(outcome.error))
     estimate_rest(slam, outcome.grasps)
-    return finish(session, rig, slam, outcome.grasps, session.results)
+    return finish(session, rig, slam, outcome.grasps, session.results, outcome.properties)
 
 
 @contextmanager
@@ -238,6 +240,8 @@ def _conductor_settings(rig: Rig, request: SessionRequest) -> SessionSettings:
     changes: dict[str, Any] = {} if request.grasps is None else {"grasps": request.grasps}
     if request.policy is not None:
         changes["exploration"] = settings.exploration.model_copy(update={"policy": request.policy})
+    if request.weighings:
+        changes["weighings"] = request.weighings
     if request.bounding_box:
         changes["probing"] = settings.probing.model_copy(update={"enabled": True})
     return settings.model_copy(update=changes)

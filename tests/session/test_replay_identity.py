@@ -142,7 +142,9 @@ def bits(grasp):
         for way in grasp.approach_paths
     ]
     poses = (grasp.world_T_palm.matrix().tobytes(), grasp.hand_motion_world.matrix().tobytes())
-    return grasp.index, grasp.stamp_ns, contacts, ways, poses
+    sigma = grasp.motion_sigma
+    noise = None if sigma is None else (sigma.translation_m.hex(), sigma.rotation_rad.hex())
+    return grasp.index, grasp.stamp_ns, contacts, ways, poses, noise
 
 
 @pytest.mark.parametrize(("fingertips", "stop_N"), [("nano17", 0.3), ("biotac", 0.3)])
@@ -161,6 +163,7 @@ def test_a_simulated_session_is_understood_the_same_from_its_bytes(tmp_path, fin
     assert len(live[0].approach_paths) == 5
     assert live[1].approach_paths == ()  # a second capture after one closing
     assert live[1].hand_motion_world.x() == pytest.approx(0.01, abs=0.002)
+    assert (live[1].motion_sigma is not None) == (fingertips == "nano17")  # a carry that was felt, or only assumed
     frames = [outcome for outcome in outcomes if isinstance(outcome, TruthFrame)]
     assert [frame.grasp_index for frame in frames] == [0, 1]
     assert frames[0].frame.image.ndim == 2

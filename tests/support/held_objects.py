@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from gtsam import Pose2
 
@@ -34,7 +36,9 @@ def steps_of(contacts, count):
     frames = np.tile(np.eye(4), (count + 1, 1, 1))
     void = np.zeros(shape, dtype=bool)
     times = np.full(count, STEP_s)
-    return TipSteps(points, normals, np.zeros((*shape, 3)), np.ones(shape), np.zeros((count, 2)), void, frames, times)
+    still, forces, sinking = np.zeros((*shape, 3)), np.ones(shape), np.zeros(shape)
+    net = np.zeros((count, 3))
+    return TipSteps(points, normals, still, forces, sinking, np.zeros(shape), net, void, frames, times)
 
 
 def carried(contacts, *, object_motion, palm_motion, felt=FINGERS, extra_moves=None, count=_STEPS):
@@ -52,7 +56,7 @@ def carried(contacts, *, object_motion, palm_motion, felt=FINGERS, extra_moves=N
         moves[:, FINGERS.index(finger)] += extra / count
     forces = still.forces_N * [finger in felt for finger in FINGERS]
     frames = np.array([_matrix(_share(palm_motion, k / count)) for k in range(count + 1)])
-    return TipSteps(points, normals, moves, forces, still.net_forces_N, still.is_void, frames, still.step_s)
+    return replace(still, points_m=points, normals=normals, moves_m=moves, forces_N=forces, world_T_palm=frames)
 
 
 def _share(motion, share):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from gtsam import Pose2
@@ -26,6 +26,10 @@ _FAR_m, _FAR_rad = 0.004, float(np.deg2rad(5.0))
 _RESISTED_SHARES = (0.2, 0.6)
 """Net force over the sum of normal forces: usual on a table, and where all fingertips slide the same way."""
 _RESISTS = 0.25
+_USUAL_NET_N, _PUSHED_SHARE = 0.8, 0.9
+"""Net force with which objects are dragged over a table, and which quantile of a carry's is compared with it."""
+_SLIDES_m_s, _SLIDES_N = 0.010, 0.2
+"""A fingertip that moves faster than this along the object, and presses more, counts as sliding."""
 _NO_HOLD_s = 0.05
 """Contacts may be missed for a few samples."""
 
@@ -38,18 +42,22 @@ class CarryNoise:
         least_m, least_rad: of any carry.
         spread: share of the differences between the answers of other assumptions about friction.
         slip_m, slip_rad: share of the slip itself.
-        lying_m, lying_rad: what release and the next closing do to the object.
+        let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
+        pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
+            explains: links pushed the object then, which feel nothing.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was not heard, or the
             object resisted.
     """
 
-    least_m: float = 0.0003
-    least_rad: float = float(np.deg2rad(0.06))
-    spread: float = 0.6
-    slip_m: float = 0.03
-    slip_rad: float = 0.015
-    lying_m: float = 0.00045
-    lying_rad: float = float(np.deg2rad(0.4))
+    least_m: float = 0.00015
+    least_rad: float = float(np.deg2rad(0.085))
+    spread: float = 0.75
+    slip_m: float = 0.02
+    slip_rad: float = 0.028
+    let_go_m_N: float = 0.0001
+    let_go_rad_N: float = float(np.deg2rad(0.12))
+    pushed_m_N: float = 0.00175
+    pushed_rad_N: float = float(np.deg2rad(1.0))
     unseen: float = 0.5
 
 
@@ -65,6 +73,7 @@ class Carry:
         single_s: how long only one did.
         resisted_N: force with which the object resisted, beyond what a table's friction explains; 0 if it did not.
         void: fingertips without valid readings for a while.
+        sliding: ratio of tangential to normal force at contacts that slid, shape (n,).
     """
 
     motion: Pose2
@@ -75,6 +84,7 @@ class Carry:
     single_s: float
     resisted_N: float
     void: tuple[str, ...]
+    sliding: Array = field(default_factory=lambda: np.zeros(0))
 
     def in_words(self) -> str:
         """What to tell a person who watches."""
@@ -144,28 +154,35 @@ class CarryOdometry:
         void_s = steps.step_s @ (steps.is_void & [finger in self._fingertips for finger in FINGERS])
         return Carry(
             motion=_pose(motions[0]),
-            sigma=self._sigma(ends.std(axis=0), slip, _unseen(steps, balance.centres_m, self._fingertips)),
+            sigma=self._sigma(ends.std(axis=0), slip, steps, _unseen(steps, balance.centres_m, self._fingertips)),
             slip_m=float(np.hypot(*slip[:2])),
             slip_rad=float(abs(slip[2])),
             loose_s=loose_s,
             single_s=single_s,
             resisted_N=_resisted_N(steps),
             void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
+            sliding=_sliding_ratios(steps, balance.sliding_m(best)),
         )
 
-    def _sigma(self, spread: Array, slip: Array, unseen: Array) -> StepSigma:
+    def _sigma(self, spread: Array, slip: Array, steps: TipSteps, unseen: Array) -> StepSigma:
         noise = self.noise
         far_m, far_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2]
         while_held_m = noise.least_m + noise.spread * far_m + noise.slip_m * np.hypot(*slip[:2])
         while_held_rad = noise.least_rad + noise.spread * far_rad + noise.slip_rad * abs(slip[2])
-        parts_m = [while_held_m, noise.lying_m, noise.unseen * unseen[0]]
-        parts_rad = [while_held_rad, noise.lying_rad, noise.unseen * unseen[1]]
+        pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
+        parts_m = [while_held_m, noise.let_go_m_N * pressed_N, noise.pushed_m_N * pushed_N, noise.unseen * unseen[0]]
+        parts_rad = [
+            while_held_rad,
+            noise.let_go_rad_N * pressed_N,
+            noise.pushed_rad_N * pushed_N,
+            noise.unseen * unseen[1],
+        ]
         scaled = self._scale * np.linalg.norm(parts_m), self._scale * np.linalg.norm(parts_rad)
         return StepSigma(float(scaled[0]), float(scaled[1]))
 
 
 def _other_assumptions(usual: Friction) -> Sequence[Friction]:
-    """Other frictions that cannot be excluded; what they change is what is not known."""
+    """Others that cannot be excluded; what they change is what is not known."""
     return (
         replace(usual, tips=0.3),
         replace(usual, tips=1.0),
@@ -173,14 +190,28 @@ def _other_assumptions(usual: Friction) -> Sequence[Friction]:
         replace(usual, foot_m=1.5 * usual.foot_m),
         replace(usual, table_N=0.0),
         replace(usual, normal_weight=usual.normal_weight / 5),
+        replace(usual, give_m=0.0),
+        replace(usual, give_m=2 * usual.give_m),
     )
+
+
+def _sliding_ratios(steps: TipSteps, sliding_m: Array) -> Array:
+    """Tangential over normal force at the contacts that slide; theirs is the edge of the friction cone."""
+    slides = (sliding_m > _SLIDES_m_s * steps.step_s[:, None]) & (steps.forces_N > _SLIDES_N)
+    return np.asarray(steps.tangential_N[slides] / steps.forces_N[slides])
 
 
 def _resistance(steps: TipSteps) -> Array:
     """How little the fingertips can be believed to stick in each step, 0 to 1, shape (n,): by their net force."""
-    share = np.linalg.norm(steps.net_forces_N, axis=1) / np.maximum(steps.forces_N.sum(axis=1), 1e-9)
+    share = np.linalg.norm(steps.net_forces_N[:, :2], axis=1) / np.maximum(steps.forces_N.sum(axis=1), 1e-9)
     low, high = _RESISTED_SHARES
     return np.asarray(np.clip((share - low) / (high - low), 0.0, 1.0) ** 2)
+
+
+def _pushed_N(steps: TipSteps) -> float:
+    """Net force of the fingertips beyond what a table's friction explains, N."""
+    net_N = np.linalg.norm(steps.net_forces_N[:, :2], axis=1)
+    return float(max(np.quantile(net_N, _PUSHED_SHARE) - _USUAL_NET_N, 0.0))
 
 
 def _resisted_N(steps: TipSteps) -> float:
@@ -188,7 +219,7 @@ def _resisted_N(steps: TipSteps) -> float:
     resists = _resistance(steps) > _RESISTS
     if steps.step_s @ resists < _NO_HOLD_s:
         return 0.0
-    return float(np.linalg.norm(steps.net_forces_N[resists], axis=1).mean())
+    return float(np.linalg.norm(steps.net_forces_N[resists, :2], axis=1).mean())
 
 
 def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip]) -> Array:

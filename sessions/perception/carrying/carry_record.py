@@ -56,6 +56,15 @@ class CarrySamples:
             np.array([sample.readings for sample in samples]),
         )
 
+    def until(self, stamp_ns: int) -> Self | None:
+        """Those up to a moment; None if fewer than two."""
+        count = int(np.searchsorted(self.stamps_ns, stamp_ns, side="right"))
+        if count < 2:
+            return None
+        return type(self)(
+            self.stamps_ns[:count], self.joints_rad[:count], self.world_T_forearm[:count], self.readings[:count]
+        )
+
 
 class CarryRecord:
     """Keeps the samples since an object was grasped.

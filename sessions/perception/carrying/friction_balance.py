@@ -5,13 +5,13 @@ each step the unknown is the object's small motion on the table, y = (dx, dy, da
 motion of fingertip i's material relative to the object at the contact, n_i its normal and N_i its normal force, y
 minimises
 
-    sum_i w N_i (n_i . s_i)^2  +  sum_i mu N_i H(|s_i - (n_i . s_i) n_i|)  +  F H(sqrt(dx^2 + dy^2 + c^2 da^2))
+    sum_i w N_i (n_i . s_i + g_i)^2  +  sum_i mu N_i H(|s_i - (n_i . s_i) n_i|)  +  F H(sqrt(dx^2 + dy^2 + c^2 da^2))
 
-Fingertips neither enter nor leave the object; those inside their friction cones stick and the others slide where it
-costs least, without anybody deciding which; the table resists (an ellipsoidal limit surface, Howe and Cutkosky 1996).
-H is the absolute value, quadratic below a creep. It is convex; reweighted least squares solve all steps at once.
-Tangential forces are not used: normals, normal forces and the fingertips' motion suffice. Without a contact the
-object stays where it is.
+Fingertips neither enter nor leave the object, but for the give g_i of their skin when the force changes; those inside
+their friction cones stick and the others slide where it costs least, without anybody deciding which; the table resists
+(an ellipsoidal limit surface, Howe and Cutkosky 1996). H is the absolute value, quadratic below a creep. It is convex;
+reweighted least squares solve all steps at once. Tangential forces are not used: normals, normal forces and the
+fingertips' motion suffice. Without a contact the object stays where it is.
 """
 
 from __future__ import annotations
@@ -41,12 +41,15 @@ class Friction:
         table_N: force of friction of the table on the object: its weight times the coefficient.
         foot_m: radius at which the table's friction acts against a turn, about 0.6 of the foot's radius.
         normal_weight: w, 1/m; how hard the normals are.
+        give_m: how much deeper a fingertip sinks in when its force grows e-fold; its joints move by so much, and the
+            object does not. Links that bend under the force do the same.
     """
 
     tips: float = 0.6
     table_N: float = 1.0
     foot_m: float = 0.03
-    normal_weight: float = 2e5
+    normal_weight: float = 5e5
+    give_m: float = 0.0003
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,7 @@ class Balance:
         sticking, sticking_gradient, sliding_squared: square of a tangential relative motion as y' A y - 2 b' y + c,
             shapes (n, 5, 9), (n, 5, 3), (n, 5).
         entering, entering_gradient: of the motions along the normals, summed, shapes (n, 3, 3) and (n, 3).
+        giving_gradient: what the latter grows by for each metre of give, shape (n, 3).
         step_s: shape (n,).
     """
 
@@ -69,6 +73,7 @@ class Balance:
     sliding_squared: Array
     entering: Array
     entering_gradient: Array
+    giving_gradient: Array
     step_s: Array
 
     @classmethod
@@ -93,6 +98,7 @@ class Balance:
             sliding_squared=squared,
             entering=np.einsum("nf,nfi,nfj->nij", forces_N, across, across),
             entering_gradient=np.einsum("nf,nfi,nf->ni", forces_N, across, along),
+            giving_gradient=np.einsum("nf,nfi,nf->ni", forces_N, across, steps.sinking),
             step_s=steps.step_s,
         )
 
@@ -104,18 +110,18 @@ class Balance:
             iterations: of reweighted least squares.
             start: motions to begin with, shape (n, 3); by default an object at rest.
         """
-        tips, table_N, foot_m, hardness = (
+        tips, table_N, foot_m, hardness, give_m = (
             np.array([getattr(choice, name) for choice in choices])[:, None]
-            for name in ("tips", "table_N", "foot_m", "normal_weight")
+            for name in ("tips", "table_N", "foot_m", "normal_weight", "give_m")
         )
         shape = (len(choices), *self.centres_m.shape[:1], 3)
         motions = np.zeros(shape) if start is None else np.broadcast_to(start, shape)
         extent = np.stack([np.ones_like(foot_m), np.ones_like(foot_m), foot_m], axis=-1)
         fixed = hardness[..., None, None] * self.entering + _LEAST_WEIGHT
-        pull = hardness[..., None] * self.entering_gradient
+        pull = hardness[..., None] * (self.entering_gradient + give_m[..., None] * self.giving_gradient)
         creep_m, rest_m = TIP_CREEP_m_s * self.step_s[:, None], TABLE_CREEP_m_s * self.step_s
         for _ in range(iterations):
-            grip = tips[..., None] * self.forces_N / np.maximum(self._sliding_m(motions), creep_m)
+            grip = tips[..., None] * self.forces_N / np.maximum(self.sliding_m(motions), creep_m)
             drag = table_N / np.maximum(np.linalg.norm(extent * motions, axis=-1), rest_m)
             stiffness = fixed + (grip[..., None, :] @ self.sticking).reshape(*shape, 3)
             stiffness += drag[..., None, None] * (extent**2)[..., None, :] * np.eye(3)
@@ -123,8 +129,8 @@ class Balance:
             motions = np.linalg.solve(stiffness, moment[..., None])[..., 0]
         return np.asarray(motions)
 
-    def _sliding_m(self, motions: Array) -> Array:
-        """Tangential motion of each fingertip relative to the object, shape (choices, n, 5)."""
+    def sliding_m(self, motions: Array) -> Array:
+        """Tangential motion of each fingertip relative to the object, shape (..., n, 5), for motions (..., n, 3)."""
         products = (motions[..., :, None] * motions[..., None, :]).reshape(*motions.shape[:-1], 9, 1)
         squares = (self.sticking @ products)[..., 0] - 2 * (self.sticking_gradient @ motions[..., None])[..., 0]
         return np.sqrt(np.maximum(squares + self.sliding_squared, 0.0))

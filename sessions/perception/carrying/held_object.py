@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from drivers.core.contacts import Array
 from drivers.core.fingertip import ContinuousFingertip, FingertipSensor
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry import Carry, CarryOdometry
-from sessions.perception.carrying.carry_record import CarryRecord
+from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.touch_capture import Measured
 
 
@@ -25,9 +27,11 @@ class HeldObject:
     """
 
     def __init__(self, fingertips: Mapping[str, FingertipSensor], side: Side, scale: float = 1.0) -> None:
-        continuous = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
-        self._record, self._odometry = CarryRecord(continuous), CarryOdometry(continuous, side, scale)
+        self.fingertips = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
+        self._record, self._odometry = CarryRecord(self.fingertips), CarryOdometry(self.fingertips, side, scale)
         self._from_ns = 0
+        self.contact_height_m = 0.0
+        """Mean height of the last capture's contacts above the table."""
         self.carry: Carry | None = None
         """The last completed one; None if the fingertips told nothing."""
 
@@ -48,6 +52,8 @@ class HeldObject:
     def on_grasp(self, measured: Measured) -> None:
         """The capture's contacts; the object was where they say in the middle of the capture."""
         self._from_ns = measured.stamp_ns
+        if measured.contacts:
+            self.contact_height_m = float(np.mean([contact.point_world_m[2] for contact in measured.contacts]))
         self._odometry.on_grasp(measured.contacts)
 
     def on_hold(self, stamp_ns: int) -> None:
@@ -58,6 +64,16 @@ class HeldObject:
     def on_left(self) -> None:
         """The object is not held."""
         self._record.end()
+
+    def samples_since(self, stamp_ns: int) -> CarrySamples | None:
+        """What hand and fingertips told since a moment of this grasp; None for too little."""
+        return self._record.since(stamp_ns)
+
+    def carried_until(self, stamp_ns: int) -> Carry | None:
+        """The carry from the capture until a moment since; None if the fingertips told nothing."""
+        samples = self._record.since(self._from_ns)
+        samples = None if samples is None else samples.until(stamp_ns)
+        return None if samples is None else self._odometry.estimate(samples)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
         """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""

@@ -25,6 +25,8 @@ STEP_SAMPLES = 2
 _JOINT_SMOOTHING_s = 0.040
 """Longer smears the beginning and the end of a motion (140 ms: twice the error); shorter leaves the sensors' noise."""
 _READING_SMOOTHING_s = 0.020
+_SLACK_N = 0.1
+"""Below this force a fingertip sinks in in proportion to it."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,9 @@ class TipSteps:
         normals: unit normals out of the object, shape (n, 5, 3).
         moves_m: motion of the fingertip's material at the contact, shape (n, 5, 3).
         forces_N: normal forces, shape (n, 5); zero without a contact that tells something.
-        net_forces_N: horizontal force of all fingertips on the object, shape (n, 2).
+        sinking: how much deeper each fingertip sinks in, in units of its give (:func:`_sinking`), shape (n, 5).
+        tangential_N: forces along the surface, shape (n, 5); zero likewise.
+        net_forces_N: force of all fingertips on the object, shape (n, 3).
         is_void: fingertips without a valid reading, shape (n, 5).
         world_T_palm: at the beginning of each step and at the end of the last, shape (n + 1, 4, 4).
         step_s: length of a step, shape (n,).
@@ -46,6 +50,8 @@ class TipSteps:
     normals: Array
     moves_m: Array
     forces_N: Array
+    sinking: Array
+    tangential_N: Array
     net_forces_N: Array
     is_void: NDArray[np.bool_]
     world_T_palm: Array
@@ -69,7 +75,8 @@ def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingerti
     frames, readings = world_T_distal[chosen], _smooth_known(samples.readings)[chosen[:-1]]
     shape = (len(chosen) - 1, len(FINGERS))
     points_m, normals, moves_m = (np.zeros((*shape, 3)) for _ in range(3))
-    forces_N, is_void, net_forces_N = np.zeros(shape), np.ones(shape, dtype=bool), np.zeros((shape[0], 2))
+    forces_N, tangential_N, is_void = np.zeros(shape), np.zeros(shape), np.ones(shape, dtype=bool)
+    net_forces_N = np.zeros((shape[0], 3))
     for finger, tip in fingertips.items():
         at = FINGERS.index(finger)
         before, after = frames[:-1, at], frames[1:, at]
@@ -79,10 +86,34 @@ def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingerti
         normals[:, at] = _middle_normals(before, after, touches.normals_distal)
         steep = np.linalg.norm(normals[:, at, :2], axis=-1) > LARGEST_SLOPE
         forces_N[:, at] = np.where(touches.is_certain & steep, np.maximum(touches.normal_forces_N, 0.0), 0.0)
-        net_forces_N -= np.einsum("nij,nj->ni", before[:, :2, :3], touches.forces_distal_N)
+        along_N = np.sum(touches.forces_distal_N**2, axis=-1) - touches.normal_forces_N**2
+        tangential_N[:, at] = np.where(forces_N[:, at] > 0.0, np.sqrt(np.maximum(along_N, 0.0)), 0.0)
+        net_forces_N -= np.einsum("nij,nj->ni", before[:, :3, :3], touches.forces_distal_N)
         is_void[:, at] = touches.is_void
     seconds = np.diff(samples.stamps_ns[chosen]) / NANOSECONDS
-    return TipSteps(points_m, normals, moves_m, forces_N, net_forces_N, is_void, world_T_palm[chosen], seconds)
+    return TipSteps(
+        points_m=points_m,
+        normals=normals,
+        moves_m=moves_m,
+        forces_N=forces_N,
+        sinking=_sinking(forces_N),
+        tangential_N=tangential_N,
+        net_forces_N=net_forces_N,
+        is_void=is_void,
+        world_T_palm=world_T_palm[chosen],
+        step_s=seconds,
+    )
+
+
+def _sinking(forces_N: Array) -> Array:
+    """Logarithm of the factor by which each normal force grows until the next step; zero where a contact comes or goes.
+
+    A round fingertip gets stiffer the more it is pressed: doubling a small force makes it sink in about as far as
+    doubling a large one.
+    """
+    later_N = np.vstack([forces_N[1:], forces_N[-1:]])
+    grown = np.log((later_N + _SLACK_N) / (forces_N + _SLACK_N))
+    return np.asarray(np.where((forces_N > 0.0) & (later_N > 0.0), grown, 0.0))
 
 
 def _transform(frames: Array, points: Array) -> Array:

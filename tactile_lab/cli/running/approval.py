@@ -42,6 +42,8 @@ class TerminalApproval:
 
 def _in_words(proposal: Proposal) -> str:
     plan = proposal.plan
+    if proposal.weighs:
+        return f"weigh the object: drag it a little to and fro, lift it a few millimetres, set it down ({plan.closing})"
     place = (
         f"x {1e3 * plan.frame.x_m:.0f} mm, y {1e3 * plan.frame.y_m:.0f} mm, yaw {math.degrees(plan.frame.yaw_rad):.0f}"
     )

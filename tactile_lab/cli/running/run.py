@@ -117,6 +117,15 @@ def run(
             rich_help_panel=_EXPLORATION,
         ),
     ] = False,
+    weighings: Annotated[
+        int,
+        typer.Option(
+            "--weigh",
+            min=0,
+            max=MOST_GRASPS,
+            help="In so many of the first grasps, drag the held object to and fro and lift it by 15 mm, to weigh it.",
+        ),
+    ] = 0,
     confirm: Annotated[
         bool,
         typer.Option(
@@ -150,6 +159,8 @@ def run(
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
         raise typer.BadParameter("needs an autonomous session", param_hint="'--confirm'")
+    if guided and weighings:
+        raise typer.BadParameter("needs an autonomous session", param_hint="'--weigh'")
     if not guided:
         _refuse_guided_options(
             {
@@ -163,7 +174,18 @@ def run(
     viewers = LiveAddress.if_wanted(live, rig, live_port, token, live_origin)
     way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
     request = SessionRequest(
-        rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
+        rig,
+        object_name,
+        out,
+        method,
+        dimension,
+        seed,
+        grasps,
+        notes,
+        allow_uncalibrated,
+        policy,
+        bounding_box,
+        weighings,
     )
     check_request(request)  # before a page is opened, or a terminal taken
     tell_left_open(out)

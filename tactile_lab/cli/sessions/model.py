@@ -35,7 +35,9 @@ def export(
     formats: Annotated[str, typer.Option("--format", help=_FORMATS, show_default="all that are installed")] = "",
     mass_kg: Annotated[
         float | None,
-        typer.Option(min=1e-4, max=100.0, help="The object's mass.", show_default="600 kg per cubic metre"),
+        typer.Option(
+            min=1e-4, max=100.0, help="The object's mass.", show_default="as weighed, or 600 kg per cubic metre"
+        ),
     ] = None,
     friction: Annotated[float, typer.Option(min=0.0, max=10.0, help="Coefficient of friction.")] = 0.5,
     name: Annotated[str, typer.Option(help="Name of the model.", show_default="the object's")] = "",
@@ -52,6 +54,7 @@ def export(
     from sessions.recording.session import RESULTS
     from sessions.recording.session_ids import slug
     from tactile_lab.cli.console import answer, emit_json, warn
+    from tactile_lab.evaluation.files.properties_file import read_mass
     from tactile_lab.models.model_files import formats_installed, write_model
     from tactile_lab.models.solid_model import make_model
 
@@ -60,7 +63,9 @@ def export(
     refuse_existing([out])
     found = choose_session(root, session)
     named = slug(name or found.manifest.object_name)
-    model = make_model(found.folder / RESULTS / "mesh.ply", named, mass_kg, friction)
+    results = found.folder / RESULTS
+    weighed = read_mass(results) if mass_kg is None else None
+    model = make_model(results / "mesh.ply", named, mass_kg if weighed is None else weighed.value, friction)
     files = write_model(out, model, wanted or formats_installed())
     if as_json:
         emit_json({"session": str(found.folder), "files": [str(file) for file in files], **model.as_json()})

@@ -19,10 +19,9 @@ from drivers.core.poses import rotate, spatial, transform_points
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.collision_spheres import Verdicts, link_balls
 from drivers.shadow.closing.posture import PROGRESS, HandShape
-from sessions.conductor.conductor import holds
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.cycle_settings import CycleSettings
-from sessions.motion.grasp_plan import GraspPlan, evade
+from sessions.motion.grasp_plan import GraspPlan, evade, holds
 from sessions.motion.motion import GraspFrame
 from sessions.motion.touching import TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.hand_candidates import grasp_time_s, table_of

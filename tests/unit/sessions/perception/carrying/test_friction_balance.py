@@ -100,7 +100,7 @@ def test_an_object_that_cannot_be_moved_resists_and_the_noise_holds_that():
     """All fingertips slide along it: kinematics alone would say that it is dragged along."""
     shift = Pose2(0.02, 0.0, 0.0)
     steps = carried(BOX, object_motion=shift, palm_motion=shift)
-    steps.net_forces_N[:] = [0.6 * steps.forces_N.sum(axis=1)[0], 0.0]
+    steps.net_forces_N[:] = [0.6 * steps.forces_N.sum(axis=1)[0], 0.0, 0.0]
     carry = odometry().carry(steps)
     assert "resisted" in carry.in_words()
     assert carry.is_remarkable

@@ -35,6 +35,13 @@ class TouchingTip:
         yes, no = np.ones(count, dtype=bool), np.zeros(count, dtype=bool)
         return TipTouches(np.tile([0.0, -0.007, 0.02], (count, 1)), along, np.ones(count), along, yes, no)
 
+    def wrenches(self, readings, world_R_distal):
+        return np.tile([0.0, -1.0, 0.0, 0.0, 0.0, 0.0], (len(readings), 1))
+
+    @property
+    def drift(self):
+        return np.zeros(6)
+
 
 def held(tips=None):
     return HeldObject({finger: TouchingTip() for finger in FINGERS} if tips is None else tips, "right")

@@ -1,0 +1,1 @@
+"""Physical properties of the object: mass and centre from a lift, friction from what slid."""

@@ -1,0 +1,132 @@
+"""What is known of the object's mass, centre and friction, each with its standard deviation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from drivers.core.fingertip import GRAVITY
+from sessions.perception.weighing.weighing import Dragging, Hanging
+
+_LEAST_SLIDING = 20
+"""Sliding contacts that are needed to tell their friction: 0.4 s of one fingertip."""
+_SLIDING_SHARE = 0.9
+"""Quantile of the force ratios at contacts that slide: some only seem to, and lie below the cone."""
+_TIP_FRICTION_SIGMA = 0.05
+
+
+@dataclass(frozen=True)
+class Value:
+    """A measured number and its standard deviation."""
+
+    value: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Centre:
+    """The centre of mass on the table, world x and y, when a grasp was captured.
+
+    Attributes:
+        grasp_index: that grasp.
+        place_m, sigma_m: shape (2,) each.
+    """
+
+    grasp_index: int
+    place_m: Array
+    sigma_m: Array
+
+
+@dataclass
+class ObjectProperties:
+    """Collects liftings, draggings and sliding contacts of a session.
+
+    Attributes:
+        hangings: with the grasp in which they were; their centre is where it was in that grasp's capture.
+        draggings: likewise.
+        sliding: ratio of tangential to normal force at contacts that slid, by the grasp after which they did.
+    """
+
+    hangings: list[tuple[int, Hanging]] = field(default_factory=list)
+    draggings: list[tuple[int, Dragging]] = field(default_factory=list)
+    sliding: list[tuple[int, Array]] = field(default_factory=list)
+
+    def undo(self, grasp_index: int) -> None:
+        """Forget what was measured after a grasp that does not count."""
+        self.hangings = [each for each in self.hangings if each[0] < grasp_index]
+        self.draggings = [each for each in self.draggings if each[0] < grasp_index]
+        self.sliding = [each for each in self.sliding if each[0] < grasp_index]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the object was weighed or dragged, with whatever result."""
+        return bool(self.hangings or self.draggings)
+
+    def in_words(self) -> str:
+        """What is known, for people."""
+        values = [
+            ("mass", self.mass_kg, 1e3, "g", 0),
+            ("table's friction", self.table_friction_N, 1.0, "N", 2),
+            ("coefficient of the table", self.table_friction, 1.0, "", 2),
+            ("of the fingertips", self.tip_friction, 1.0, "", 2),
+        ]
+        told = [
+            f"{name} {scale * each.value:.{digits}f} ± {2 * scale * each.sigma:.{digits}f} {unit}".rstrip()
+            for name, each, scale, unit, digits in values
+            if each is not None
+        ]
+        return ", ".join(told) or "nothing is known of its weight and friction"
+
+    @property
+    def mass_kg(self) -> Value | None:
+        """Mass; None if the object never hung free."""
+        weight = _mean([Value(each.weight_N, each.weight_sigma_N) for _, each in self._free])
+        return None if weight is None else Value(weight.value / GRAVITY, weight.sigma / GRAVITY)
+
+    @property
+    def centres(self) -> tuple[Centre, ...]:
+        """Centres of mass, one for each time that the object hung free."""
+        return tuple(Centre(index, each.centre_m, each.centre_sigma_m) for index, each in self._free)
+
+    @property
+    def table_friction_N(self) -> Value | None:
+        """Force of friction of the table on the object; None if it was never dragged to and fro."""
+        return _mean([Value(each.friction_N, each.friction_sigma_N) for _, each in self.draggings])
+
+    @property
+    def table_friction(self) -> Value | None:
+        """Coefficient of friction of the table; None if the object's weight is not known."""
+        mass = self.mass_kg
+        if mass is None or not self.draggings:
+            return None
+        found = []
+        for _, each in self.draggings:
+            pressed_N = max(GRAVITY * mass.value + each.pressed_N, 1e-3)
+            ratio = each.friction_N / pressed_N
+            found.append(Value(ratio, float(np.hypot(each.friction_sigma_N, ratio * GRAVITY * mass.sigma)) / pressed_N))
+        return _mean(found)
+
+    @property
+    def tip_friction(self) -> Value | None:
+        """Coefficient of friction of the fingertips on the object; None if they hardly slid."""
+        ratios = np.concatenate([np.zeros(0), *(each for _, each in self.sliding)])
+        if len(ratios) < _LEAST_SLIDING:
+            return None
+        return Value(float(np.quantile(ratios, _SLIDING_SHARE)), _TIP_FRICTION_SIGMA)
+
+    @property
+    def _free(self) -> list[tuple[int, Hanging]]:
+        return [each for each in self.hangings if each[1].is_free]
+
+
+def _mean(values: Sequence[Value]) -> Value | None:
+    """Mean, weighted by certainty; as uncertain as the best of them, since a hand's errors are the same every time."""
+    if not values:
+        return None
+    weights = np.array([max(each.sigma, 1e-9) ** -2 for each in values])
+    mean = float(weights @ [each.value for each in values] / weights.sum())
+    spread = max(abs(each.value - mean) for each in values) / 2
+    return Value(mean, float(np.hypot(min(each.sigma for each in values), spread)))

@@ -1,0 +1,137 @@
+"""Mass and centre of mass from the wrench of the fingertips while the object hangs; friction from dragging it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from drivers.core.fingertip import ContinuousFingertip
+from drivers.shadow.model.kinematics import JOINTS
+from drivers.shadow.protocol.palm_images import Side
+from sessions.perception.carrying.carry_record import CarrySamples
+from sessions.perception.weighing.net_wrench import NetWrench, net_wrench
+
+_GAIN = 0.01
+"""Error of a force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""
+_LEAST_WEIGHT_N = 0.05
+_SPEED_SHARE = 0.5
+"""Share of the largest speed below which the hand counts as turning round."""
+
+
+@dataclass(frozen=True)
+class Hanging:
+    """An object that hung from the fingers.
+
+    Attributes:
+        weight_N, weight_sigma_N: upward force of the fingertips.
+        centre_m: of mass, world x and y, shape (2,), where it hung.
+        centre_sigma_m: standard deviations, shape (2,).
+        held_back_N: by how much something held the shifted object back: friction of an edge that stood on the table.
+    """
+
+    weight_N: float
+    weight_sigma_N: float
+    centre_m: Array
+    centre_sigma_m: Array
+    held_back_N: float
+
+    @property
+    def is_free(self) -> bool:
+        """Whether nothing but the fingers held it: the rest is what the noise makes of it."""
+        return self.weight_N > _LEAST_WEIGHT_N and self.held_back_N < 0.02 * self.weight_N + 2 * self.weight_sigma_N
+
+
+@dataclass(frozen=True)
+class Dragging:
+    """An object that was dragged to and fro over the table.
+
+    Attributes:
+        friction_N, friction_sigma_N: of the table.
+        pressed_N: by how much the fingers pressed it onto the table.
+    """
+
+    friction_N: float
+    friction_sigma_N: float
+    pressed_N: float
+
+
+def hanging(
+    samples: CarrySamples,
+    fingertips: Mapping[str, ContinuousFingertip],
+    side: Side,
+    joint_sigma_rad: float,
+    height_m: float,
+) -> Hanging:
+    """Weight and centre of an object that hung during these samples.
+
+    Args:
+        samples: while it hung and was shifted there and back.
+        fingertips: by finger.
+        side: of the hand.
+        joint_sigma_rad: constant error of each joint angle.
+        height_m: of the contacts above the table: forces there that do not cancel make moments.
+    """
+    found = net_wrench(samples, fingertips, side)
+    best = _weight_and_centre(found, height_m)
+    turned = np.eye(len(JOINTS)) * joint_sigma_rad
+    others = [
+        _weight_and_centre(net_wrench(samples, {finger: tip}, side, turn), height_m, found, finger_alone)
+        for finger, tip in fingertips.items()
+        for finger_alone in [net_wrench(samples, {finger: tip}, side)]
+        for turn in turned[[name.startswith(finger) for name in JOINTS]]
+    ]
+    spread = np.square(np.array(others) - best).sum(axis=0)
+    drift = _drift(fingertips, best[0])
+    sigma = np.sqrt(spread + drift**2)
+    return Hanging(
+        weight_N=float(best[0]),
+        weight_sigma_N=float(np.hypot(sigma[0], _GAIN * best[0])),
+        centre_m=best[1:],
+        centre_sigma_m=sigma[1:],
+        held_back_N=abs(_held_back_N(found)),
+    )
+
+
+def dragging(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> Dragging:
+    """Friction of the table on an object that was dragged to and fro during these samples."""
+    found = net_wrench(samples, fingertips, side)
+    friction_N = _held_back_N(found)
+    return Dragging(friction_N, float(np.hypot(0.02, 0.05 * friction_N)), -float(found.force_N[:, 2].mean()))
+
+
+def _weight_and_centre(
+    wrench: NetWrench, height_m: float, whole: NetWrench | None = None, instead_of: NetWrench | None = None
+) -> Array:
+    """Weight (N) and centre (m, m), shape (3,); of ``whole`` with one part of it replaced by ``wrench``."""
+    force, moment = wrench.force_N.mean(axis=0), wrench.moment_Nm.mean(axis=0)
+    if whole is not None and instead_of is not None:
+        force = force + (whole.force_N - instead_of.force_N).mean(axis=0)
+        moment = moment + (whole.moment_Nm - instead_of.moment_Nm).mean(axis=0)
+    palm = wrench.palm_m.mean(axis=0)
+    below_m, weight_N = height_m - palm[2], max(float(force[2]), _LEAST_WEIGHT_N)
+    x = (below_m * force[0] - moment[1]) / weight_N
+    y = (below_m * force[1] + moment[0]) / weight_N
+    return np.array([force[2], palm[0] + x, palm[1] + y])
+
+
+def _drift(fingertips: Mapping[str, ContinuousFingertip], weight_N: float) -> Array:
+    """Standard deviations of weight and centre by the drift of the sensors since their tare, shape (3,)."""
+    drifts = np.array([tip.drift for tip in fingertips.values()]).reshape(-1, 6)
+    force_N, moment_Nm = (float(np.sqrt(np.square(drifts[:, part]).sum() / 3)) for part in (slice(0, 3), slice(3, 6)))
+    lever_m = (moment_Nm + 0.1 * force_N) / max(weight_N, _LEAST_WEIGHT_N)
+    return np.array([force_N, lever_m, lever_m])
+
+
+def _held_back_N(wrench: NetWrench) -> float:
+    """Half the difference of the pull on the object between moving one way and the other, along the motion."""
+    speed = np.gradient(wrench.palm_m[:, :2], axis=0)
+    way = np.linalg.svd(wrench.palm_m[:, :2] - wrench.palm_m[:, :2].mean(axis=0))[2][0]
+    along, pull_N = speed @ way, wrench.force_N[:, :2] @ way
+    fast = _SPEED_SHARE * np.quantile(np.abs(along), 0.9)
+    there, back = along > fast, along < -fast
+    if not (there.any() and back.any()):
+        return 0.0
+    return float((np.median(pull_N[there]) - np.median(pull_N[back])) / 2)

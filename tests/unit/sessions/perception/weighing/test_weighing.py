@@ -1,0 +1,153 @@
+"""Mass, centre and friction from made wrenches of a hanging and of a dragged object."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.core.contacts import FINGERS
+from drivers.core.errors import SessionError
+from drivers.core.fingertip import GRAVITY
+from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm_matrix, palm_T_distal_matrices
+from sessions.perception.carrying.carry_record import CarrySamples
+from sessions.perception.carrying.held_object import HeldObject
+from sessions.perception.weighing.net_wrench import upward_N
+from sessions.perception.weighing.object_properties import ObjectProperties
+from sessions.perception.weighing.scales import Scales
+from sessions.perception.weighing.weighing import Dragging, dragging, hanging
+from sessions.recording.session_events import EventKind, SessionEvent
+
+MASS_kg, CENTRE_m, HEIGHT_m = 0.3, np.array([0.4, -0.02]), 0.05
+JOINT_SIGMA_rad = float(np.radians(0.6))
+POSTURE_rad = np.where([name.endswith("J3") for name in JOINTS], 0.9, 0.2)
+
+
+class PlainTip:
+    """Its readings are the wrench about the distal origin, without weight and bias."""
+
+    drift = np.array([0.01, 0.01, 0.01, 5e-5, 5e-5, 5e-5])
+
+    def reading(self):
+        return self.wrench
+
+    def wrenches(self, readings, world_R_distal):
+        return readings
+
+    def __init__(self):
+        self.wrench = np.zeros(6)
+
+
+TIPS = {finger: PlainTip() for finger in FINGERS}
+
+
+def held_samples(pull_N=0.0, upward_N=MASS_kg * GRAVITY, centre_m=CENTRE_m):
+    """A hand that moves to and fro along x, its fingers carrying a weight at a centre and dragging against a pull."""
+    count = 41
+    aside_m = 0.005 * np.interp(np.arange(count), [0, 10, 30, 40], [0.0, 1.0, -1.0, 0.0])
+    speed = np.sign(np.gradient(aside_m))
+    joints = np.tile(POSTURE_rad, (count, 1))
+    forearms = np.tile(np.eye(4), (count, 1, 1))
+    forearms[:, 0, 3] = aside_m
+    frames = (forearms @ forearm_T_palm_matrix(joints, "right"))[:, None] @ palm_T_distal_matrices(joints, "right")
+    readings = np.zeros((count, 5, 6))
+    for n in range(count):
+        place = np.array([centre_m[0] + aside_m[n], centre_m[1], HEIGHT_m])
+        for at, finger in enumerate(FINGERS):
+            squeeze = np.array([0.0, 2.0, 0.0]) if finger == "TH" else np.array([0.0, -0.5, 0.0])
+            on_tip = -(squeeze + np.array([speed[n] * pull_N, 0.0, upward_N]) / 5)
+            rotation, origin = frames[n, at, :3, :3], frames[n, at, :3, 3]
+            readings[n, at] = [*(rotation.T @ on_tip), *(rotation.T @ np.cross(place - origin, on_tip))]
+    return CarrySamples(1e7 * np.arange(count), joints, forearms, readings)
+
+
+def test_what_hangs_free_is_weighed_and_its_centre_found():
+    found = hanging(held_samples(), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+    assert found.weight_N == pytest.approx(MASS_kg * GRAVITY, abs=1e-9)
+    np.testing.assert_allclose(found.centre_m, CENTRE_m, atol=1e-9)
+    assert found.held_back_N == pytest.approx(0.0, abs=1e-9)
+    assert found.is_free
+    assert 0.005 < found.weight_sigma_N / found.weight_N < 0.05
+    assert (found.centre_sigma_m > 0.0003).all()
+
+
+def test_joint_angles_that_are_wrong_by_what_is_stated_stay_within_the_stated_error():
+    true, rng = held_samples(), np.random.default_rng(1)
+    off = []
+    for _ in range(20):
+        wrong = replace(true, joints_rad=true.joints_rad + rng.normal(0.0, JOINT_SIGMA_rad, len(JOINTS)))
+        found = hanging(wrong, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+        off.append((found.weight_N - MASS_kg * GRAVITY) / found.weight_sigma_N)
+    assert np.sqrt(np.mean(np.square(off))) < 1.5
+
+
+def test_an_edge_that_still_stands_on_the_table_is_noticed():
+    found = hanging(held_samples(pull_N=0.3, upward_N=2.0), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+    assert found.held_back_N == pytest.approx(0.3, abs=1e-6)
+    assert not found.is_free
+
+
+def test_friction_of_the_table_is_half_the_difference_between_to_and_fro():
+    found = dragging(held_samples(pull_N=1.0, upward_N=-0.2), TIPS, "right")
+    assert found.friction_N == pytest.approx(1.0, abs=1e-6)
+    assert found.pressed_N == pytest.approx(0.2, abs=1e-9)
+
+
+def test_a_fingertip_without_a_reading_counts_for_nothing():
+    samples = held_samples()
+    samples.readings[:, 0] = np.nan
+    assert hanging(samples, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m).weight_N == pytest.approx(0.8 * MASS_kg * GRAVITY)
+
+
+def test_the_upward_force_now_is_that_of_the_newest_readings():
+    TIPS["FF"].wrench = np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
+    assert upward_N(TIPS, np.tile(np.eye(3), (5, 1, 1))) == pytest.approx(1.5)
+    TIPS["FF"].wrench = np.zeros(6)
+
+
+def known():
+    found = ObjectProperties()
+    found.draggings.append((0, Dragging(1.05, 0.05, 0.06)))
+    found.hangings.append((1, hanging(held_samples(), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)))
+    found.sliding.append((1, np.linspace(0.5, 0.9, 100)))
+    return found
+
+
+def test_properties_come_with_their_standard_deviations():
+    found = known()
+    assert found.mass_kg.value == pytest.approx(MASS_kg)
+    assert found.table_friction.value == pytest.approx(1.05 / (MASS_kg * GRAVITY + 0.06))
+    assert found.tip_friction.value == pytest.approx(0.86, abs=0.01)
+    assert found.centres[0].grasp_index == 1
+    assert "mass 300 ±" in found.in_words()
+
+
+def test_what_did_not_hang_free_is_no_mass():
+    found = ObjectProperties()
+    stands = hanging(held_samples(pull_N=0.3, upward_N=2.0), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+    found.hangings.append((0, stands))
+    assert found.mass_kg is None
+    assert found.is_known
+    assert "nothing" in found.in_words()
+
+
+def test_an_undone_grasp_takes_along_what_was_weighed_in_it():
+    found = known()
+    found.undo(1)
+    assert found.mass_kg is None
+    assert found.table_friction_N.value == pytest.approx(1.05)
+    assert found.tip_friction is None
+
+
+def test_an_end_without_a_beginning_is_refused():
+    scales = Scales(HeldObject({}, "right"), "right", JOINT_SIGMA_rad)
+    with pytest.raises(SessionError, match="without its beginning"):
+        scales.event(SessionEvent(EventKind.HANG_END, 1), 0)
+
+
+def test_fingertips_that_tell_nothing_while_they_move_weigh_nothing():
+    scales = Scales(HeldObject({}, "right"), "right", JOINT_SIGMA_rad)
+    for kind in (EventKind.DRAG_BEGIN, EventKind.DRAG_END, EventKind.HANG_BEGIN, EventKind.HANG_END):
+        assert scales.event(SessionEvent(kind, 1), 0) is None
+    assert not scales.properties.is_known
