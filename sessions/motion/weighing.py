@@ -29,7 +29,8 @@ class WeighingSettings(StrictModel):
         squeeze_s: time to build it up.
         lift_m, lift_m_s: how far and how fast.
         most_N: upward force at which the hand lifts no further, and sets the object down again.
-        shift_m, shift_m_s: how far to each side, and how fast, the object is dragged, and moved while it hangs.
+        drag_m: how far to each side the object is dragged.
+        shift_m, shift_m_s: how far to each side it is moved while it hangs; how fast it is moved and dragged.
         rest_s: for the object to stop swinging.
         patience: cycles in a row with too much force, or without a hold, after which the object is set down again.
     """
@@ -39,6 +40,7 @@ class WeighingSettings(StrictModel):
     lift_m: float = Field(default=0.015, gt=0.0, le=0.05)
     lift_m_s: float = Field(default=0.04, gt=0.0, le=0.05)
     most_N: float = Field(default=8.0, gt=0.0)
+    drag_m: float = Field(default=0.006, gt=0.0, le=0.02)
     shift_m: float = Field(default=0.003, gt=0.0, le=0.01)
     shift_m_s: float = Field(default=0.03, gt=0.0, le=0.05)
     rest_s: float = Field(default=0.1, ge=0.0)
@@ -83,17 +85,17 @@ class Weigher:
 
     def weigh(self, frame: GraspFrame, table: Closing) -> LiftEnd:
         """Drag and lift the object held at a grasp frame, and set it down where it was."""
-        runtime = self._motion.runtime
+        s, runtime = self._settings, self._motion.runtime
 
         def raised(height_m: float, aside_m: float = 0.0) -> Array:
             return self._motion.base_joints(frame.shifted_inside(np.array([0.0, aside_m])), table, height_m)
 
-        self._rest(self._settings.squeeze_s)
+        self._rest(s.squeeze_s)
         runtime.begin_hold()
-        end = self._move_to_and_fro(raised, 0.0, runtime.begin_dragging, runtime.end_dragging)
+        end = self._move_to_and_fro(raised, (0.0, s.drag_m), runtime.begin_dragging, runtime.end_dragging)
         if end is LiftEnd.HUNG:
             end = self._lift(raised)
-        self._rest(self._settings.rest_s)
+        self._rest(s.rest_s)
         return end
 
     def _lift(self, raised: Callable[..., Array]) -> LiftEnd:
@@ -102,7 +104,7 @@ class Weigher:
         share, end = self._follow(lambda share: raised(share * s.lift_m), s.lift_m / s.lift_m_s)
         if end is LiftEnd.HUNG:
             self._rest(s.rest_s)
-            end = self._move_to_and_fro(raised, s.lift_m, runtime.begin_hanging, runtime.end_hanging)
+            end = self._move_to_and_fro(raised, (s.lift_m, s.shift_m), runtime.begin_hanging, runtime.end_hanging)
         height_m = share * s.lift_m
         self._motion.follow(lambda share: raised((1 - share) * height_m), s.lift_m / s.lift_m_s, self._keep)
         return end
@@ -110,18 +112,24 @@ class Weigher:
     def _move_to_and_fro(
         self,
         raised: Callable[..., Array],
-        height_m: float,
+        where_m: tuple[float, float],
         begin: Callable[[], object],
         complete: Callable[[], object],
     ) -> LiftEnd:
         """To one side, to the other and back; what the fingertips feel meanwhile is measured.
 
-        That is across the direction in which the thumb holds against the fingers: along it, their forces would change.
+        The hand moves across the direction in which the thumb holds against the fingers: along it, their forces would
+        change.
+
+        Args:
+            raised: positioner joints at a height and a distance aside.
+            where_m: the height, and how far to each side.
+            begin, complete: tell the runtime what is measured.
         """
-        s = self._settings
+        height_m, far_m = where_m
         begin()
-        duration_s = 4 * s.shift_m / s.shift_m_s
-        _, end = self._follow(lambda share: raised(height_m, _to_and_fro(share) * s.shift_m), duration_s)
+        duration_s = 4 * far_m / self._settings.shift_m_s
+        _, end = self._follow(lambda share: raised(height_m, _to_and_fro(share) * far_m), duration_s)
         if end is LiftEnd.HUNG:
             complete()
         return end

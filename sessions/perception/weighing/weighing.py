@@ -17,6 +17,10 @@ from sessions.perception.weighing.net_wrench import NetWrench, net_wrench
 _GAIN = 0.01
 """Error of a force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""
 _LEAST_WEIGHT_N = 0.05
+_DRAG_N, _DRAG_SHARE = 0.02, 0.08
+"""Error of a measured friction: an object that has only begun to slide is held back by less."""
+_SLIDING_QUANTILE = 0.6
+"""The dragged object lags behind when the hand turns round: the stronger pulls are those at which it slides."""
 _SPEED_SHARE = 0.5
 """Share of the largest speed below which the hand counts as turning round."""
 
@@ -98,8 +102,8 @@ def hanging(
 def dragging(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> Dragging:
     """Friction of the table on an object that was dragged to and fro during these samples."""
     found = net_wrench(samples, fingertips, side)
-    friction_N = _held_back_N(found)
-    return Dragging(friction_N, float(np.hypot(0.02, 0.05 * friction_N)), -float(found.force_N[:, 2].mean()))
+    friction_N = _held_back_N(found, _SLIDING_QUANTILE)
+    return Dragging(friction_N, float(np.hypot(_DRAG_N, _DRAG_SHARE * friction_N)), -float(found.force_N[:, 2].mean()))
 
 
 def _weight_and_centre(
@@ -125,8 +129,13 @@ def _drift(fingertips: Mapping[str, ContinuousFingertip], weight_N: float) -> Ar
     return np.array([force_N, lever_m, lever_m])
 
 
-def _held_back_N(wrench: NetWrench) -> float:
-    """Half the difference of the pull on the object between moving one way and the other, along the motion."""
+def _held_back_N(wrench: NetWrench, quantile: float = 0.5) -> float:
+    """Half the difference of the pull on the object between moving one way and the other, along the motion.
+
+    Args:
+        wrench: of the fingertips.
+        quantile: of the pull in each direction that counts, reckoned from the weakest.
+    """
     speed = np.gradient(wrench.palm_m[:, :2], axis=0)
     way = np.linalg.svd(wrench.palm_m[:, :2] - wrench.palm_m[:, :2].mean(axis=0))[2][0]
     along, pull_N = speed @ way, wrench.force_N[:, :2] @ way
@@ -134,4 +143,4 @@ def _held_back_N(wrench: NetWrench) -> float:
     there, back = along > fast, along < -fast
     if not (there.any() and back.any()):
         return 0.0
-    return float((np.median(pull_N[there]) - np.median(pull_N[back])) / 2)
+    return float((np.quantile(pull_N[there], quantile) - np.quantile(pull_N[back], 1.0 - quantile)) / 2)

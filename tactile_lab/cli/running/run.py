@@ -174,19 +174,9 @@ def run(
     viewers = LiveAddress.if_wanted(live, rig, live_port, token, live_origin)
     way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
     request = SessionRequest(
-        rig,
-        object_name,
-        out,
-        method,
-        dimension,
-        seed,
-        grasps,
-        notes,
-        allow_uncalibrated,
-        policy,
-        bounding_box,
-        weighings,
+        rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
     )
+    request = replace(request, weighings=weighings)
     check_request(request)  # before a page is opened, or a terminal taken
     tell_left_open(out)
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"

@@ -35,9 +35,7 @@ def export(
     formats: Annotated[str, typer.Option("--format", help=_FORMATS, show_default="all that are installed")] = "",
     mass_kg: Annotated[
         float | None,
-        typer.Option(
-            min=1e-4, max=100.0, help="The object's mass.", show_default="as weighed, or 600 kg per cubic metre"
-        ),
+        typer.Option(min=1e-4, max=100.0, help="The object's mass.", show_default="as weighed, or 600 kg/m³"),
     ] = None,
     friction: Annotated[float, typer.Option(min=0.0, max=10.0, help="Coefficient of friction.")] = 0.5,
     name: Annotated[str, typer.Option(help="Name of the model.", show_default="the object's")] = "",

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from gtsam import Pose2
 
+from drivers.core.contacts import FINGERS
 from sessions.perception.carrying.carry import CarryOdometry
 from sessions.perception.carrying.friction_balance import Balance, Friction, compose_steps
 from tests.support.held_objects import BOX, DISC, carried, steps_of
@@ -107,9 +108,44 @@ def test_an_object_that_cannot_be_moved_resists_and_the_noise_holds_that():
     assert carry.sigma.translation_m > error(carry, Pose2())[0] / 1e3 / 3
 
 
+def test_a_fingertip_that_sinks_in_does_not_drag_the_object():
+    """The thumb presses twice as hard and gives, 0.3 mm for each e-fold; joints move so far, the box does not."""
+    steps = carried(BOX, object_motion=Pose2(), palm_motion=Pose2())
+    thumb, grown = FINGERS.index("TH"), np.log(2.0)
+    steps.sinking[:, thumb] = grown / len(steps)
+    steps.moves_m[:, thumb] -= steps.normals[:, thumb] * 0.0003 * grown / len(steps)
+    assert error(odometry().carry(steps), Pose2())[0] < 0.01
+    steps.sinking[:] = 0.0
+    assert error(odometry().carry(steps), Pose2())[0] > 0.03
+
+
+def test_an_object_that_is_let_go_under_force_is_less_certain():
+    firm, eased = (carried(BOX, object_motion=TURN, palm_motion=TURN) for _ in range(2))
+    eased.forces_N[-1] *= 0.3
+    assert odometry().carry(eased).sigma.rotation_rad < odometry().carry(firm).sigma.rotation_rad
+
+
+def test_links_that_push_show_in_the_net_force_and_in_the_noise():
+    steps = carried(BOX, object_motion=TURN, palm_motion=TURN)
+    alone = odometry().carry(steps).sigma
+    steps.net_forces_N[:] = [1.2, 0.0, 0.0]
+    pushed = odometry().carry(steps).sigma
+    assert pushed.translation_m > alone.translation_m + 0.0002
+    assert pushed.rotation_rad > alone.rotation_rad
+
+
+def test_contacts_that_slide_tell_the_edge_of_the_cone():
+    steps = carried(BOX, object_motion=Pose2(), palm_motion=Pose2())
+    steps.moves_m[:, 0, 0] = 0.02 * steps.step_s
+    steps.tangential_N[:, 0] = 0.9
+    np.testing.assert_allclose(odometry().carry(steps).sliding, 0.9)
+
+
 def test_two_assumptions_that_differ_widen_the_noise():
     sure = odometry().carry(carried(BOX, object_motion=TURN, palm_motion=TURN))
-    spread = odometry().carry(carried(BOX, object_motion=TURN, palm_motion=TURN, felt=("FF", "TH")))
+    steps = carried(BOX, object_motion=TURN, palm_motion=TURN, felt=("FF", "TH"))
+    steps.forces_N[:] *= 2.5  # two press as hard as five: the opening hand does the same to the object
+    spread = odometry().carry(steps)
     assert spread.sigma.rotation_rad >= sure.sigma.rotation_rad
 
 
