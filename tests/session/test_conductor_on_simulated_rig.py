@@ -16,6 +16,7 @@ from drivers.shadow.protocol.palm_codec import decode_command
 from drivers.simulation.settings import ObjectStart
 from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
+from sessions.conductor.policy_decisions import Approve, approve_everything
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.motion.box_prober import ProbingSettings
@@ -85,6 +86,8 @@ def run(
     act: Callable[[SimulatedWorld, int, str], None] = lambda world, number, name: None,
     start: ObjectStart | None = None,
     safety: SafetySettings | None = None,
+    weighings: int = 0,
+    approve: Approve = approve_everything,
 ) -> Session:
     rig = load_rig("sim")
     simulation = rig.description.simulation.model_copy(update={"object": "box-10x6x4", "start": start})
@@ -93,11 +96,19 @@ def run(
     watcher, truth = Watcher(lambda number, name: act(world, number, name)), watch_truth(runtime, world)
     carrying = ExplorationSettings(policy=None)
     at_once = ProbingSettings(top=False)
-    settings = SessionSettings(grasps=grasps, safety=safety or SafetySettings(), exploration=carrying, probing=at_once)
+    settings = SessionSettings(
+        grasps=grasps,
+        safety=safety or SafetySettings(),
+        exploration=carrying,
+        probing=at_once,
+        weighings=weighings,
+    )
     runtime.connect()
     try:
         slam = TactileSlam(SlamSettings(), SEED)
-        conductor = Conductor(runtime, settings, autonomous_roles(runtime, slam, settings, seed=SEED), watcher)
+        conductor = Conductor(
+            runtime, settings, autonomous_roles(runtime, slam, settings, seed=SEED, approve=approve), watcher
+        )
         outcome = conductor.run()
     finally:
         runtime.close()
@@ -122,6 +133,24 @@ def watch_truth(runtime: RigRuntime, world: SimulatedWorld) -> list[TrueGrasp]:
 def session() -> Session:
     """Three grasps on the 10 x 6 x 4 cm box; the third is chosen by the estimate."""
     return run(3)
+
+
+@pytest.mark.long
+def test_a_held_object_is_weighed() -> None:
+    """The box has 300 g."""
+    weighed = run(2, weighings=2)
+    assert weighed.outcome.ending is Ending.COMPLETE
+    assert EventKind.DRAG_END in [mark.kind for mark in weighed.sink.marks]
+    mass = weighed.outcome.properties.mass_kg
+    assert mass is not None
+    assert abs(mass.value - 0.3) < 4 * mass.sigma
+
+
+@pytest.mark.long
+def test_a_person_may_refuse_that_it_is_weighed() -> None:
+    kept = run(1, weighings=1, approve=lambda proposal: not proposal.weighs)
+    assert EventKind.DRAG_BEGIN not in [mark.kind for mark in kept.sink.marks]
+    assert not kept.outcome.properties.is_known
 
 
 def test_session_completes(session: Session) -> None:
