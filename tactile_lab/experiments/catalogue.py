@@ -38,6 +38,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         thesis_figures.FIGURE_3_14,
         thesis_figures.FIGURE_3_15,
         thesis_figures.FIGURE_3_16,
+        thesis_figures.FIGURE_3_20,
+        thesis_figures.FIGURE_3_21,
         thesis_figures.THESIS_READINGS,
         *thesis_drawings.ALL,
         exploration.TABLE_4_2,

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 CURVES_KEY = "mark: median; band: up to the 90th percentile"
 DRAWINGS_KEY = "lines: outlines, to scale; dots: contacts"
+SURFACES_KEY = "shade: light is low, dark is high; dots: contacts; all to the same scale"
 RANGES_KEY = "dot: median; thick line: up to the 90th percentile; thin line: up to the largest value"
 
 
@@ -126,6 +127,30 @@ class DrawingPanel:
     dots: tuple[tuple[float, float], ...] = ()
 
 
+Facet: TypeAlias = tuple[float, ...]
+"""A triangle in the picture: x and y of its three corners in millimetres, then its shade, 0 light to 1 dark."""
+
+
+@dataclass(frozen=True)
+class SurfacePanel:
+    """A surface seen from the side and above, shaded by a value; all panels of a plot have the same scale.
+
+    Attributes:
+        title: text above it.
+        facets: from the back to the front.
+        dots: x and y in the picture, millimetres.
+        names: a text, and where it stands in the picture: x and y in millimetres.
+    """
+
+    title: str
+    facets: tuple[Facet, ...]
+    dots: tuple[tuple[float, float], ...] = ()
+    names: tuple[tuple[str, float, float], ...] = ()
+
+
+Panel: TypeAlias = "CurvePanel | RangePanel | DrawingPanel | SurfacePanel"
+
+
 @dataclass(frozen=True)
 class Plot:
     """Charts of one kind, side by side.
@@ -137,7 +162,7 @@ class Plot:
         width: width of the sheet, pixels.
     """
 
-    panels: tuple[CurvePanel | RangePanel | DrawingPanel, ...]
+    panels: tuple[Panel, ...]
     columns: int = 2
     key: str = ""
     width: float = 920.0
@@ -170,15 +195,31 @@ def _drawing_panel(found: Mapping[str, Any]) -> DrawingPanel:
     return DrawingPanel(found["title"], tuple(map(Stroke.from_json, found["strokes"])), _pairs(found["dots"]))
 
 
+def _surface_panel(found: Mapping[str, Any]) -> SurfacePanel:
+    facets = tuple(tuple(map(float, facet)) for facet in found["facets"])
+    names = tuple((str(text), float(x), float(y)) for text, x, y in found["names"])
+    return SurfacePanel(found["title"], facets, _pairs(found["dots"]), names)
+
+
 def _pairs(found: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
     return tuple((float(x), float(y)) for x, y in found)
 
 
-_panel_of: Mapping[str, Any] = {"curves": _curve_panel, "ranges": _range_panel, "drawings": _drawing_panel}
-_kinds: Mapping[type, str] = {CurvePanel: "curves", RangePanel: "ranges", DrawingPanel: "drawings"}
+_panel_of: Mapping[str, Any] = {
+    "curves": _curve_panel,
+    "ranges": _range_panel,
+    "drawings": _drawing_panel,
+    "surfaces": _surface_panel,
+}
+_kinds: Mapping[type, str] = {
+    CurvePanel: "curves",
+    RangePanel: "ranges",
+    DrawingPanel: "drawings",
+    SurfacePanel: "surfaces",
+}
 
 
-def panel_json(panel: CurvePanel | RangePanel | DrawingPanel) -> dict[str, Any]:
+def panel_json(panel: Panel) -> dict[str, Any]:
     """A panel as plain data: numbers with four digits, infinity as a text, because JSON cannot represent it."""
     return {field.name: _plain(getattr(panel, field.name)) for field in fields(panel)}
 

@@ -23,9 +23,11 @@ from tactile_lab.experiments.plot_data import (
     Range,
     RangePanel,
     Series,
+    SurfacePanel,
 )
 from tactile_lab.experiments.plot_drawings import drawings_svg
 from tactile_lab.experiments.plot_sheet import LETTER_px, Look, Sheet
+from tactile_lab.experiments.plot_surfaces import surfaces_svg
 from tactile_lab.report.svg import Chart, Frame, tick_label
 
 _BESIDE = 9.0
@@ -40,7 +42,10 @@ def draw(title: str, plot: Plot) -> str:
     curves = [panel for panel in plot.panels if isinstance(panel, CurvePanel)]
     ranges = [panel for panel in plot.panels if isinstance(panel, RangePanel)]
     drawings = [panel for panel in plot.panels if isinstance(panel, DrawingPanel)]
+    surfaces = [panel for panel in plot.panels if isinstance(panel, SurfacePanel)]
     sheet = Sheet(title, plot.width, min(plot.columns, len(plot.panels)), [panel.title for panel in plot.panels])
+    if surfaces:
+        return surfaces_svg(sheet, surfaces, plot.key)
     if drawings:
         return drawings_svg(sheet, drawings, plot.key)
     return _curves_svg(sheet, curves, plot.key) if curves else _ranges_svg(sheet, ranges, plot.key)

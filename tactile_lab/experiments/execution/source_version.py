@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 _ROOT = Path(__file__).resolve().parents[3]
-_PLOTS = ("plots", "plot_data", "plot_sheet")
+_PLOTS = ("plots", "plot_data", "plot_drawings", "plot_sheet", "plot_surfaces")
 _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
 _WITHOUT = ("cli", "workflow", "view", "report", "experiments/results", *(f"experiments/{name}.py" for name in _PLOTS))
 """Parts of tactile_lab that only present results or read commands, except for these modules:"""

@@ -8,7 +8,7 @@ from dataclasses import replace
 from textwrap import fill
 from typing import TypeAlias
 
-from tactile_lab.experiments.plot_data import CURVES_KEY, RANGES_KEY, CurvePanel, DrawingPanel, Plot, RangePanel
+from tactile_lab.experiments.plot_data import CURVES_KEY, RANGES_KEY, CurvePanel, Plot, RangePanel
 from tactile_lab.experiments.plot_sheet import EARLIER
 from tactile_lab.experiments.results.stored_result import Part, StoredResult, Table
 from tactile_lab.experiments.summary import markdown
@@ -74,11 +74,11 @@ def merge_plots(parts: Sequence[Part]) -> Plot | None:
 
 
 def _with_earlier(newer: Plot, older: Plot) -> Plot:
-    if type(newer.panels[0]) is not type(older.panels[0]) or isinstance(newer.panels[0], DrawingPanel):
+    if type(newer.panels[0]) is not type(older.panels[0]) or not isinstance(newer.panels[0], Lines):
         return newer
-    panels: dict[str, Lines] = {panel.title: panel for panel in newer.panels if not isinstance(panel, DrawingPanel)}
+    panels: dict[str, Lines] = {panel.title: panel for panel in newer.panels if isinstance(panel, Lines)}
     for panel in older.panels:
-        if not isinstance(panel, DrawingPanel):
+        if isinstance(panel, Lines):
             panels[panel.title] = _with_lines(panels.get(panel.title), panel)
     if not any(line.name.endswith(EARLIER) for panel in panels.values() for line in panel.lines):
         return newer

@@ -16,6 +16,7 @@ from tactile_lab.experiments.studies.columns import (
 from tactile_lab.experiments.studies.planar import PLANAR_GRASPS
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, condition, curves, ranges
 from tactile_lab.experiments.summary import Column
+from tactile_lab.experiments.thesis import rig_sessions
 from tactile_lab.experiments.thesis.readings import READINGS, track_as_read
 
 THREE_SHAPES = ("rectangle", "ellipse", "hexagon")
@@ -129,5 +130,34 @@ FIGURE_3_16 = Experiment(
     TRACKING_COLUMNS,
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: f"{cell['shape']}, {condition(cell)}"),
     pooled=("shape",),
+    grasps=PLANAR_GRASPS,
+)
+
+_RIG_COLUMNS = (
+    HAUSDORFF,
+    MEAN_DISTANCE,
+    REGISTRATION,
+    Column("grasps not placed", "untracked", 0, kind="spread"),
+)
+
+FIGURE_3_20 = Experiment(
+    "figure-3.20",
+    "Thesis, figure 3.20: contours on the simulated rig, by the filter alone and with the pose graph.",
+    lambda grasps: rig_sessions.settings(rig_sessions.PLANAR_OBJECTS, 2, grasps),
+    rig_sessions.estimate_on_rig,
+    _RIG_COLUMNS,
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: cell["object"], columns=3),
+    pooled=("object",),
+    grasps=PLANAR_GRASPS,
+)
+
+FIGURE_3_21 = Experiment(
+    "figure-3.21",
+    "Thesis, figure 3.21: surfaces on the simulated rig, by the filter alone and with the pose graph.",
+    lambda grasps: rig_sessions.settings(rig_sessions.SOLID_OBJECTS, 3, grasps),
+    rig_sessions.estimate_on_rig,
+    _RIG_COLUMNS,
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: cell["object"], columns=3),
+    pooled=("object",),
     grasps=PLANAR_GRASPS,
 )

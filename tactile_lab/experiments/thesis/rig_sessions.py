@@ -1,0 +1,113 @@
+"""The thesis's filter on what the simulated rig records, without and with its pose graph: figures 3.20 and 3.21.
+
+As in section 3.6 the hand grasps, turns the object in its hold, puts it down and grasps again. Every grasp follows the
+fixed rule, so that all methods see the same grasps; a recording of the session would give them again, byte for byte.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import trimesh
+from gtsam import Pose3
+
+from drivers.core.contacts import Grasp
+from sessions.conductor.conductor import Conductor
+from sessions.recording.recorder import NullRecorder
+from tactile_lab.autonomy.autonomous_roles import autonomous_roles
+from tactile_lab.autonomy.settings import SessionSettings
+from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, symmetry_turns
+from tactile_lab.experiments.cells import Cell, Setting, grid
+from tactile_lab.experiments.data.true_surface import true_outline
+from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
+from tactile_lab.experiments.studies.everyday_sessions import ForceWatch
+from tactile_lab.rigs.build import build_runtime, simulated_world
+from tactile_lab.rigs.description import Rig, load_rig
+from tactile_lab.slam.result import SlamResult
+from tactile_lab.slam.tactile_slam import TactileSlam
+from tactile_lab.workflow.running import slam_settings
+
+RIG = "sim"
+PLANAR_OBJECTS = ("box-10x6x4", "triangular-prism", "hexagonal-prism")
+SOLID_OBJECTS = ("box-12x6x6", "cube-6", "l-block")
+"""The thesis shows its own objects in a photograph, figure 3.19: they have faces only."""
+METHODS = ("thesis-pf", "thesis-pf-graph", "joint")
+_WHILE_RECORDING = "odometry"
+"""The estimation that runs during the recording; nothing asks it, and it costs next to nothing."""
+
+
+@dataclass(frozen=True)
+class RigSession:
+    """The grasps of a session on the simulated rig, and the truth.
+
+    Attributes:
+        mesh: the object, in its own frame.
+        grasps: as measured.
+        world_T_body: true pose of the object at each of them.
+    """
+
+    mesh: trimesh.Trimesh
+    grasps: tuple[Grasp, ...]
+    world_T_body: tuple[Pose3, ...]
+
+
+def settings(objects: Sequence[str], dimension: int, grasps: int) -> list[Setting]:
+    """Every object with each method; methods last, so that one recording serves them all."""
+    return grid(object=objects, dimension=[dimension], grasps=[grasps], method=METHODS)
+
+
+def estimate_on_rig(cell: Cell) -> dict[str, Any]:
+    """One method on one session. Cell: object, dimension, grasps, method."""
+    dimension = int(cell["dimension"])
+    session = record(str(cell["object"]), cell.seed, dimension, int(cell["grasps"]))
+    motion = load_rig(RIG).description.motion
+    slam = TactileSlam(slam_settings(str(cell["method"]), dimension, motion), cell.seed)
+    for grasp in session.grasps:
+        slam.add_grasp(grasp)
+    return _figures(session, slam.finish())
+
+
+@lru_cache(maxsize=1)
+def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSession:
+    """Run a session on the simulated rig. Raises ConfigurationError for an object that it does not have."""
+    rig = load_rig(RIG)
+    world = simulated_world(rig, seed, object_name)
+    runtime, watch = build_runtime(rig, world, NullRecorder()), ForceWatch(world)
+    slam = TactileSlam(slam_settings(_WHILE_RECORDING, dimension, rig.description.motion), seed)
+    conductor = _by_rule(rig, grasps)
+    runtime.connect()
+    try:
+        roles = autonomous_roles(runtime, slam, conductor, seed=seed, dimension=dimension)
+        outcome = Conductor(runtime, conductor, roles, watch).run()
+    finally:
+        runtime.close()
+    count = min(len(outcome.grasps), len(watch.truth))
+    return RigSession(watch.mesh, tuple(outcome.grasps[:count]), tuple(watch.truth[:count]))
+
+
+def _by_rule(rig: Rig, grasps: int) -> SessionSettings:
+    """The rig's settings, but every grasp by the fixed rule, which carries the object after each."""
+    own = rig.description.conductor
+    exploration = own.exploration.model_copy(update={"policy": None})
+    return own.model_copy(update={"exploration": exploration, "grasps": grasps, "fixed_grasps": grasps})
+
+
+def _figures(session: RigSession, result: SlamResult) -> dict[str, Any]:
+    mesh, truth = session.mesh, session.world_T_body
+    if result.dimension == 2:
+        shape = contour_figures(result.contour, true_outline(mesh))
+    else:
+        shape = mesh_figures(result.mesh, mesh)
+    poses = modulo_symmetry(result.world_T_object, truth, symmetry_turns(mesh))
+    contacts = [grasp.points_world_m for grasp in session.grasps]
+    return {
+        **shape,
+        "registration_mm": registration_rms_mm(contacts, poses, truth, result.dimension),
+        "status": result.status,
+        "grasps_done": len(session.grasps),
+        "untracked": sum(step.verdict == "untracked" for step in result.steps),
+    }
