@@ -15,6 +15,7 @@ from tactile_lab.experiments.studies import (
     planar,
     solids,
     thesis_drawings,
+    thesis_exploration,
     thesis_figures,
 )
 
@@ -42,6 +43,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         thesis_figures.FIGURE_3_21,
         thesis_figures.THESIS_READINGS,
         *thesis_drawings.ALL,
+        *thesis_exploration.ALL,
         exploration.TABLE_4_2,
         exploration.TABLE_4_3,
         exploration.EXPLORATION_HAND,

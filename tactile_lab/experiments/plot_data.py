@@ -9,7 +9,7 @@ from typing import Any, Self, TypeAlias
 
 CURVES_KEY = "mark: median; band: up to the 90th percentile"
 DRAWINGS_KEY = "lines: outlines, to scale; dots: contacts"
-SURFACES_KEY = "shade: light is low, dark is high; dots: contacts; all to the same scale"
+SURFACES_KEY = "shade: light is low, dark is high; lines: edges of the true surface; dots: contacts"
 RANGES_KEY = "dot: median; thick line: up to the 90th percentile; thin line: up to the largest value"
 
 
@@ -138,12 +138,14 @@ class SurfacePanel:
     Attributes:
         title: text above it.
         facets: from the back to the front.
+        edges: of the true surface, as x and y of both ends in the picture, millimetres.
         dots: x and y in the picture, millimetres.
         names: a text, and where it stands in the picture: x and y in millimetres.
     """
 
     title: str
     facets: tuple[Facet, ...]
+    edges: tuple[tuple[float, ...], ...] = ()
     dots: tuple[tuple[float, float], ...] = ()
     names: tuple[tuple[str, float, float], ...] = ()
 
@@ -196,9 +198,9 @@ def _drawing_panel(found: Mapping[str, Any]) -> DrawingPanel:
 
 
 def _surface_panel(found: Mapping[str, Any]) -> SurfacePanel:
-    facets = tuple(tuple(map(float, facet)) for facet in found["facets"])
+    facets, edges = (tuple(tuple(map(float, row)) for row in found[name]) for name in ("facets", "edges"))
     names = tuple((str(text), float(x), float(y)) for text, x, y in found["names"])
-    return SurfacePanel(found["title"], facets, _pairs(found["dots"]), names)
+    return SurfacePanel(found["title"], facets, edges, _pairs(found["dots"]), names)
 
 
 def _pairs(found: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:

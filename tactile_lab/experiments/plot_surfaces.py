@@ -34,7 +34,8 @@ def surfaces_svg(sheet: Sheet, panels: Sequence[SurfacePanel], key: str) -> str:
 
 def _middle_and_span(panel: SurfacePanel) -> tuple[Array, Array]:
     corners = [np.reshape(facet[:6], (3, 2)) for facet in panel.facets]
-    points = np.vstack([np.reshape(panel.dots, (-1, 2)), *corners, *([] if panel.facets else [np.zeros((1, 2))])])
+    others = [np.reshape(rows, (-1, 2)) for rows in (panel.dots, panel.edges)]
+    points = np.vstack([*others, *corners, *([] if panel.facets else [np.zeros((1, 2))])])
     return (points.min(axis=0) + points.max(axis=0)) / 2, np.maximum(np.ptp(points, axis=0), 1.0)
 
 
@@ -48,6 +49,8 @@ def _surface(panel: SurfacePanel, middle: Array, span: Array, width: float) -> C
     chart = Chart(whole, (left, right), (bottom, top))
     for facet in panel.facets:
         _facet(chart, facet)
+    for edge in np.reshape(panel.edges, (-1, 2, 2)):
+        chart.segment(edge[0], edge[1], "grid", "stroke:var(--ink);stroke-width:1.2;stroke-dasharray:4 3")
     for dot in panel.dots:
         chart.dot(dot, "dot", radius=3.2, style="fill:#d7263d")
     for text, x, y in panel.names:

@@ -39,17 +39,18 @@ def drawings(panel_of: Callable[[Cell], str], line: str, *, columns: int = 3) ->
 
 def _panel(title: str, rows: Sequence[Row], line: str) -> DrawingPanel:
     drawn = [(str(row.cell[line]), (row.figures or {})["drawing"]) for row in rows]
-    strokes = [Stroke(name, _points(drawing["estimate"])) for name, drawing in drawn if drawing["estimate"]]
+    strokes = [Stroke(name, points_of(drawing["estimate"])) for name, drawing in drawn if drawing["estimate"]]
     first = drawn[0][1]
-    dots = _points(first["contacts"]) if len(rows) == 1 or _same_contacts(drawn) else ()
-    return DrawingPanel(title, (Stroke(_TRUTH, _points(first["truth"])), *strokes), dots)
+    dots = points_of(first["contacts"]) if len(rows) == 1 or _same_contacts(drawn) else ()
+    return DrawingPanel(title, (Stroke(_TRUTH, points_of(first["truth"])), *strokes), dots)
 
 
 def _same_contacts(drawn: Sequence[tuple[str, dict[str, list[list[float]]]]]) -> bool:
     return all(drawing["contacts"] == drawn[0][1]["contacts"] for _, drawing in drawn)
 
 
-def _points(found: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
+def points_of(found: Sequence[Sequence[float]]) -> tuple[tuple[float, float], ...]:
+    """Points of a drawing in a row's figures, millimetres."""
     return tuple((x, y) for x, y in found)
 
 
@@ -126,12 +127,10 @@ FIGURE_3_11 = Experiment(
 FIGURE_3_13 = Experiment(
     "figure-3.13",
     "Thesis, figure 3.13: three solids grow while they are tracked, at full motion noise.",
-    lambda grasps: grid(
-        shape=("box-12x6x6", "cylinder", "l-block"), after=[1, 4, 12, 24], noise=[100], method=["joint"]
-    ),
+    lambda grasps: grid(shape=("box-12x6x6", "cylinder", "l-block"), after=[1, 4, 12], noise=[100], method=["joint"]),
     progress.surface_after,
     _ERRORS,
-    drawings(lambda cell: f"{cell['shape']}, {cell['after']} grasps", "method", columns=4),
+    drawings(lambda cell: f"{cell['shape']}, {cell['after']} grasps", "method", columns=3),
 )
 
 _MODEL_COLUMNS = (

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import trimesh
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from tactile_lab.experiments.cells import Row
@@ -22,6 +24,7 @@ _TOWARDS = np.array(
 )
 """Direction from the object to the observer."""
 _RIGHT = np.array([-np.sin(_AZIMUTH_rad), np.cos(_AZIMUTH_rad), 0.0])
+_SHARP_rad = np.deg2rad(30.0)
 _PICTURE = np.column_stack([_RIGHT, np.cross(_TOWARDS, _RIGHT)])
 
 
@@ -30,7 +33,12 @@ def in_picture(points_m: Array) -> list[list[float]]:
     return [[round(x, 1), round(y, 1)] for x, y in (1e3 * points_m @ _PICTURE).tolist()]
 
 
-def facets(vertices_m: Array, faces: Array, shades: Array) -> list[list[float]]:
+def faces_observer(normals: Array) -> Array:
+    """Which of these directions, shape (n, 3), point towards the observer."""
+    return np.asarray(normals @ _TOWARDS > 0)
+
+
+def facets(vertices_m: Array, faces: NDArray[np.integer[Any]], shades: Array) -> list[list[float]]:
     """The triangles that face the observer, from the back to the front, as rows of a surface panel.
 
     Args:
@@ -43,8 +51,17 @@ def facets(vertices_m: Array, faces: Array, shades: Array) -> list[list[float]]:
     seen = np.flatnonzero(outward @ _TOWARDS > 0)
     ordered = seen[np.argsort(corners[seen].mean(axis=1) @ _TOWARDS)]
     flat = (1e3 * corners[ordered] @ _PICTURE).reshape(-1, 6)
-    rows: list[list[float]] = np.column_stack([flat.round(1), shades[faces[ordered]].mean(axis=1).round(2)]).tolist()
+    rows: list[list[float]] = np.column_stack(
+        [flat.round(1), np.median(shades[faces[ordered]], axis=1).round(2)]
+    ).tolist()
     return rows
+
+
+def edges(mesh: trimesh.Trimesh) -> list[list[float]]:
+    """The sharp edges of a solid, as rows of a surface panel."""
+    sharp = mesh.face_adjacency_edges[mesh.face_adjacency_angles > _SHARP_rad]
+    ends = in_picture(mesh.vertices[sharp.ravel()])
+    return [[*first, *second] for first, second in zip(ends[::2], ends[1::2], strict=True)]
 
 
 def between_0_and_1(values: Array) -> Array:
@@ -72,4 +89,5 @@ def surfaces(panel_of: Any, key: str, *, columns: int = 3) -> PlotOf:
 
 def _panel(title: str, picture: dict[str, Any]) -> SurfacePanel:
     names = tuple((str(text), x, y) for text, x, y in picture.get("names", ()))
-    return SurfacePanel(title, tuple(map(tuple, picture["facets"])), tuple(map(tuple, picture["dots"])), names)
+    drawn, lines, dots = (tuple(map(tuple, picture[part])) for part in ("facets", "edges", "dots"))
+    return SurfacePanel(title, drawn, lines, dots, names)

@@ -71,6 +71,13 @@ def estimate_on_rig(cell: Cell) -> dict[str, Any]:
     return _figures(session, slam.finish())
 
 
+def by_rule(rig: Rig, grasps: int) -> SessionSettings:
+    """The rig's settings, but every grasp by the fixed rule, which carries the object after each."""
+    own = rig.description.conductor
+    exploration = own.exploration.model_copy(update={"policy": None})
+    return own.model_copy(update={"exploration": exploration, "grasps": grasps, "fixed_grasps": grasps})
+
+
 @lru_cache(maxsize=1)
 def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSession:
     """Run a session on the simulated rig. Raises ConfigurationError for an object that it does not have."""
@@ -78,7 +85,7 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
     world = simulated_world(rig, seed, object_name)
     runtime, watch = build_runtime(rig, world, NullRecorder()), ForceWatch(world)
     slam = TactileSlam(slam_settings(_WHILE_RECORDING, dimension, rig.description.motion), seed)
-    conductor = _by_rule(rig, grasps)
+    conductor = by_rule(rig, grasps)
     runtime.connect()
     try:
         roles = autonomous_roles(runtime, slam, conductor, seed=seed, dimension=dimension)
@@ -87,13 +94,6 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
         runtime.close()
     count = min(len(outcome.grasps), len(watch.truth))
     return RigSession(watch.mesh, tuple(outcome.grasps[:count]), tuple(watch.truth[:count]))
-
-
-def _by_rule(rig: Rig, grasps: int) -> SessionSettings:
-    """The rig's settings, but every grasp by the fixed rule, which carries the object after each."""
-    own = rig.description.conductor
-    exploration = own.exploration.model_copy(update={"policy": None})
-    return own.model_copy(update={"exploration": exploration, "grasps": grasps, "fixed_grasps": grasps})
 
 
 def _figures(session: RigSession, result: SlamResult) -> dict[str, Any]:

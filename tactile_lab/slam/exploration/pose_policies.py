@@ -125,19 +125,46 @@ class PoseSwitchPolicy:
         return replace(chosen, policy=self.name, reason=reason)
 
     def _pose_scores(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Array:
-        assert belief.surface is not None
-        count = self.settings.particles
-        rows, before = sampled_poses(belief, count, rng), np.full(count, 1.0 / count)
-        known = _tabulate_surface(belief, self.settings)
-        measurement = CalibratedMeasurement(self.settings.likelihood)
-        scores = np.full(len(candidates), -np.inf)
-        for index, points in enumerate(expected_contacts(candidates, belief, belief.surface)):
-            if len(points):
-                seen = imagine(points, belief, self.settings)
-                log_likelihood = measurement.log_likelihood(rows, seen, known)
-                after = np.exp(log_likelihood - log_likelihood.max())
-                scores[index] = self.gain(rows, before, after)
-        return scores
+        simulated = simulate_weights(candidates, belief, self.settings, rng)
+        before = np.full(len(simulated.rows), 1.0 / len(simulated.rows))
+        gains = [-np.inf if after is None else self.gain(simulated.rows, before, after) for after in simulated.weights]
+        return np.array(gains)
+
+
+@dataclass(frozen=True)
+class SimulatedWeights:
+    """What the particles would weigh after each candidate's expected contacts.
+
+    Attributes:
+        rows: the particles, equally probable before, rows (x m, y m, yaw rad), shape (p, 3).
+        weights: of each candidate, shape (p,), largest 1; None for one that is expected to touch nothing.
+    """
+
+    rows: Array
+    weights: tuple[Array | None, ...]
+
+
+def simulate_weights(
+    candidates: Sequence[Candidate], belief: Belief, settings: PoseSwitchSettings, rng: np.random.Generator
+) -> SimulatedWeights:
+    """Weigh sampled poses by the contacts that the estimate expects of each candidate; the belief has a surface."""
+    assert belief.surface is not None
+    rows, known = sampled_poses(belief, settings.particles, rng), _tabulate_surface(belief, settings)
+    weights = [
+        _weigh(rows, imagine(points, belief, settings), known, settings) if len(points) else None
+        for points in expected_contacts(candidates, belief, belief.surface)
+    ]
+    return SimulatedWeights(rows, tuple(weights))
+
+
+def weigh(rows: Array, contacts: ContactSet, belief: Belief, settings: PoseSwitchSettings) -> Array:
+    """Weights of particles, rows of shape (p, 3), after contacts in the world; shape (p,), the largest is 1."""
+    return _weigh(rows, contacts, _tabulate_surface(belief, settings), settings)
+
+
+def _weigh(rows: Array, contacts: ContactSet, known: Known, settings: PoseSwitchSettings) -> Array:
+    log_likelihood = CalibratedMeasurement(settings.likelihood).log_likelihood(rows, contacts, known)
+    return np.asarray(np.exp(log_likelihood - log_likelihood.max()))
 
 
 def imagine(points_m: Array, belief: Belief, settings: PoseSwitchSettings) -> ContactSet:

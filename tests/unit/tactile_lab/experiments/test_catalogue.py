@@ -42,6 +42,12 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "figure-2.15": ({"shape": ["sphere"], "model": ["TP kernel"]}, None),
     "figure-3.11": ({"shape": ["ellipse"], "after": ["1", "4"], "method": ["joint"]}, None),
     "figure-3.13": ({"shape": ["cylinder"], "after": ["1"]}, None),
+    "figure-3.20": ({"object": ["box-10x6x4"], "method": ["thesis-pf"]}, 1),
+    "figure-3.21": ({"object": ["cube-6"], "method": ["thesis-pf-graph"]}, 1),
+    "figure-4.1": ({}, None),
+    "figure-4.3": ({"after": ["3"]}, None),
+    "figure-4.4": ({"policy": ["variance"], "after": ["1", "3"]}, None),
+    "figure-4.6": ({}, None),
     "shape-models": ({"shape": ["rectangle"], "contacts": ["20"], "model": ["Nagata patches", "edge features"]}, None),
     "shape-models-3d": ({"shape": ["sphere"], "model": ["point cloud"]}, None),
     "table-4.2": ({"candidates": ["10"], "policy": ["information", "clairvoyant"]}, 12),
@@ -59,7 +65,15 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
 }
 
 # Whole sessions on the simulated rig, and whole surfaces.
-LENGTHY = ("crash-recovery", "everyday-objects", "exploration-hand", "forearm-on-rig", "hands")
+LENGTHY = (
+    "crash-recovery",
+    "everyday-objects",
+    "exploration-hand",
+    "figure-3.20",
+    "figure-3.21",
+    "forearm-on-rig",
+    "hands",
+)
 
 
 def marked(study: Experiment) -> object:
