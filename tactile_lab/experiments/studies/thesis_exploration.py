@@ -27,10 +27,10 @@ FIGURE_4_1 = Experiment(
     lambda grasps: grid(measure=list(explored_cube.MEASURES)),
     explored_cube.mapped,
     (
-        Column("within 10 mm of a contact", "near", 2),
-        Column("10 to 30 mm", "between", 2),
-        Column("beyond 30 mm", "far", 2),
-        Column("rank correlation with the variance", "with_variance", 2),
+        Column("within 10 mm of a contact", "near", 2, kind="median"),
+        Column("10 to 30 mm", "between", 2, kind="median"),
+        Column("beyond 30 mm", "far", 2, kind="median"),
+        Column("rank correlation with the variance", "with_variance", 2, kind="median"),
     ),
     surfaces(
         lambda cell: cell["measure"],

@@ -148,7 +148,7 @@ FIGURE_3_20 = Experiment(
     _RIG_COLUMNS,
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: cell["object"], columns=3),
     pooled=("object",),
-    grasps=PLANAR_GRASPS,
+    grasps=rig_sessions.GRASPS,
 )
 
 FIGURE_3_21 = Experiment(
@@ -159,5 +159,5 @@ FIGURE_3_21 = Experiment(
     _RIG_COLUMNS,
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: cell["object"], columns=3),
     pooled=("object",),
-    grasps=PLANAR_GRASPS,
+    grasps=rig_sessions.GRASPS,
 )

@@ -15,7 +15,9 @@ import trimesh
 from gtsam import Pose3
 
 from drivers.core.contacts import Grasp
+from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
+from sessions.conductor.progress import NullProgress
 from sessions.recording.recorder import NullRecorder
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
@@ -24,17 +26,16 @@ from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, sy
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
-from tactile_lab.experiments.studies.everyday_sessions import ForceWatch
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.running import slam_settings
 
-RIG = "sim"
+RIG, GRASPS = "sim", 12
 PLANAR_OBJECTS = ("box-10x6x4", "triangular-prism", "hexagonal-prism")
 SOLID_OBJECTS = ("box-12x6x6", "cube-6", "l-block")
-"""The thesis shows its own objects in a photograph, figure 3.19: they have faces only."""
+"""The thesis shows its own in a photograph; it says that they have faces only."""
 METHODS = ("thesis-pf", "thesis-pf-graph", "joint")
 _WHILE_RECORDING = "odometry"
 """The estimation that runs during the recording; nothing asks it, and it costs next to nothing."""
@@ -72,10 +73,15 @@ def estimate_on_rig(cell: Cell) -> dict[str, Any]:
 
 
 def by_rule(rig: Rig, grasps: int) -> SessionSettings:
-    """The rig's settings, but every grasp by the fixed rule, which carries the object after each."""
+    """The rig's settings, but every grasp by the fixed rule, which carries the object after each.
+
+    The objects are known to be low: nothing is probed before the first grasp.
+    """
     own = rig.description.conductor
     exploration = own.exploration.model_copy(update={"policy": None})
-    return own.model_copy(update={"exploration": exploration, "grasps": grasps, "fixed_grasps": grasps})
+    at_once = own.probing.model_copy(update={"top": False})
+    ruled = {"exploration": exploration, "probing": at_once, "grasps": grasps, "fixed_grasps": grasps}
+    return own.model_copy(update=ruled)
 
 
 @lru_cache(maxsize=1)
@@ -83,7 +89,7 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
     """Run a session on the simulated rig. Raises ConfigurationError for an object that it does not have."""
     rig = load_rig(RIG)
     world = simulated_world(rig, seed, object_name)
-    runtime, watch = build_runtime(rig, world, NullRecorder()), ForceWatch(world)
+    runtime, watch = build_runtime(rig, world, NullRecorder()), _TruthWatch(world)
     slam = TactileSlam(slam_settings(_WHILE_RECORDING, dimension, rig.description.motion), seed)
     conductor = by_rule(rig, grasps)
     runtime.connect()
@@ -93,7 +99,25 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
     finally:
         runtime.close()
     count = min(len(outcome.grasps), len(watch.truth))
-    return RigSession(watch.mesh, tuple(outcome.grasps[:count]), tuple(watch.truth[:count]))
+    return RigSession(world.object_model.mesh, tuple(outcome.grasps[:count]), tuple(watch.truth[:count]))
+
+
+class _TruthWatch(NullProgress):
+    """Notes the object's true pose at each capture.
+
+    Args:
+        world: the truth.
+    """
+
+    def __init__(self, world: SimulatedWorld) -> None:
+        self._world, self._captured = world, False
+        self.truth: list[Pose3] = []
+
+    def phase(self, number: int, name: str) -> None:
+        """The first step after a capture: the object is still as it was measured."""
+        if self._captured:
+            self.truth.append(self._world.truth().world_T_object)
+        self._captured = name == "capture"
 
 
 def _figures(session: RigSession, result: SlamResult) -> dict[str, Any]:
