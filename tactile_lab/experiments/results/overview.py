@@ -27,7 +27,7 @@ def overview(docs: Path, results: Mapping[str, StoredResult], sources: str) -> d
     texts = {_picture(claim): draw(claim.title, plot(claim, results)) for claim in written.claims}
     sections = [_section(claim, results) for claim in written.claims]
     pages = [written.intro.strip(), _glance(written, results, sources), *sections, written.outro.strip()]
-    texts[OVERVIEW] = "\n\n".join([*pages, _index(results)]) + "\n"
+    texts[OVERVIEW] = "\n\n".join([*pages, _index(written, results)]).rstrip() + "\n"
     return texts
 
 
@@ -73,8 +73,11 @@ def _balance(claim: Claim, results: Mapping[str, StoredResult]) -> str:
     return f"*Missed: {missed} of {len(verdicts)} goals.*" if missed else "*Every goal is met.*"
 
 
-def _index(results: Mapping[str, StoredResult]) -> str:
-    return _fill("All pages: " + ", ".join(f"[{name}]({RESULTS}/{name}.md)" for name in results) + ".")
+def _index(claims: Claims, results: Mapping[str, StoredResult]) -> str:
+    """Links to the pages that no claim leads to."""
+    linked = {name for claim in claims.claims for name in claim.pages}
+    others = [f"[{name}]({RESULTS}/{name}.md)" for name in results if name not in linked]
+    return _fill(f"More pages: {', '.join(others)}.") if others else ""
 
 
 def _fill(text: str) -> str:
