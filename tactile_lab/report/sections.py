@@ -225,26 +225,26 @@ def tracking_section(content: ReportContent) -> Markup:
         )
         seen = [("truth", "marker camera")] if content.truth is not None else []
         shown = legend([("estimate", "estimate"), *seen])
-        parts.append(
-            element("div", figure(way, caption, "On the table", shown), loops_card(content), class_="pair wide")
-        )
-    parts.append(_picture_card(content))
+        picture = _picture_card(content)
+        cards = [figure(way, caption, "On the table", shown), *([] if picture is None else [picture])]
+        parts.append(element("div", *cards, loops_card(content), class_="pair wide"))
+    if content.camera_problem:
+        text = f"No picture of the camera can be shown: {content.camera_problem}"
+        parts.append(element("p", text, class_="note"))
     return join(parts)
 
 
-def _picture_card(content: ReportContent) -> Markup:
-    """The camera's last picture with the estimate in it, or why there is none; nothing without a camera."""
+def _picture_card(content: ReportContent) -> Markup | None:
+    """The camera's last picture with the estimate in it; None without one."""
     picture = camera_picture(content)
     if content.camera is None or picture is None:
-        text = f"No picture of the camera can be shown: {content.camera_problem}"
-        return element("p", text, class_="note") if content.camera_problem else Markup("")
+        return None
     where = "on the table" if content.results.dimension == 2 else "at the height of the contacts"
     caption = (
         f"The outline is drawn {where}, where the estimated pose places it; thin lines are two standard deviations."
     )
     keys = legend([("estimate-seen", "estimate"), ("truth-seen", "truth, by the marker"), ("seen", "contacts")])
-    title = f"The camera's picture of grasp {content.camera.grasp + 1}"
-    return element("div", figure(picture, caption, title, keys), class_="pair wide")
+    return figure(picture, caption, f"The camera's picture of grasp {content.camera.grasp + 1}", keys)
 
 
 def _tracking_lead(content: ReportContent) -> str:
