@@ -76,7 +76,8 @@ def try_action(cell: Cell) -> dict[str, Any]:
     simulated = simulate_weights(pushed.candidates, pushed.belief, _SETTINGS, rng)
     rows, before = simulated.rows, np.full(len(simulated.rows), 1.0 / len(simulated.rows))
     if cell["action"] == NOTHING:
-        return {**_errors(rows, before, pushed.truth), "drawing": _drawing(pushed, rows, before, None, rng)}
+        nothing = dict.fromkeys(GAINS, 0.0)
+        return {**nothing, **_errors(rows, before, pushed.truth), "drawing": _drawing(pushed, rows, before, None, rng)}
     number = list(ACTIONS).index(cell["action"])
     foreseen = [before if weights is None else weights for weights in simulated.weights]
     gains = {name: [gain(rows, before, weights) for weights in foreseen] for name, gain in GAINS.items()}
