@@ -11,8 +11,8 @@ from drivers.core.contacts import Array
 from drivers.core.fingertip import GRAVITY
 from sessions.perception.weighing.weighing import Dragging, Hanging
 
-_LEAST_SLIDING = 20
-"""Sliding contacts that are needed to tell their friction: 0.4 s of one fingertip."""
+_LEAST_SLIDING = 40
+"""Sliding contacts that are needed to tell their friction: 0.8 s of one fingertip."""
 _SLIDING_SHARE = 0.9
 """Quantile of the force ratios at contacts that slide: some only seem to, and lie below the cone."""
 _TIP_FRICTION_SIGMA = 0.05
