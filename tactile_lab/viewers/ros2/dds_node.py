@@ -94,6 +94,8 @@ class DdsNode:
                 services = list(self._services)
             for reader, writer, answer in services:
                 for request in reader.take(_AT_ONCE):
+                    if not isinstance(request, TriggerRequest):
+                        continue  # it says that a client has left
                     success, text = answer()
                     writer.write(TriggerReply(request.client, request.number, success, text))
 
