@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.core.atomic_files import write_whole
+from sessions.exchange.addresses import write_anywhere
 from tactile_lab.experiments.cells import Row
 from tactile_lab.experiments.execution.source_version import version
 
@@ -18,7 +18,7 @@ def write_parquet(path: Path, name: str, rows: Sequence[Row]) -> None:
     in the file of results. The table's metadata names the experiment and the version of the program.
 
     Args:
-        path: of the file, replaced as a whole.
+        path: of the file, or its address; replaced as a whole.
         name: of the experiment.
         rows: the runs.
 
@@ -34,7 +34,7 @@ def write_parquet(path: Path, name: str, rows: Sequence[Row]) -> None:
     table = table.replace_schema_metadata({"experiment": name, "version": version()})
     buffer = pyarrow.BufferOutputStream()
     parquet.write_table(table, buffer)
-    write_whole(path, buffer.getvalue().to_pybytes(), "Choose another file with --parquet")
+    write_anywhere(path, buffer.getvalue().to_pybytes(), "Choose another file with --parquet")
 
 
 def _plain(row: Row) -> dict[str, Any]:

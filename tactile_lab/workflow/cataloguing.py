@@ -8,11 +8,13 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from drivers.core.atomic_files import write_whole
 from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.installed.extras import require_package
+from sessions.exchange.addresses import address_of, write_anywhere
+from sessions.exchange.elsewhere import list_elsewhere
 from sessions.recording.listing import SessionSummary, list_sessions
 from sessions.recording.manifest import Manifest
 from sessions.recording.session import Session
@@ -57,25 +59,42 @@ def catalogue(roots: Sequence[Path]) -> list[Line]:
     """One line for each session directly under the folders, oldest first; every column of :data:`UNITS`, None if
     unknown. A session that cannot be read has its problem.
 
+    Args:
+        roots: folders, or addresses such as ``s3://bucket/laboratory``, of which the records alone are read.
+
     Raises:
         ConfigurationError: a folder does not exist or cannot be read.
+        WriteError: an address cannot be reached.
     """
     for root in roots:
-        if not root.is_dir():
+        if address_of(root) is None and not root.is_dir():
             raise ConfigurationError("there is no such folder", where=str(root), hint="Name folders of sessions")
-    lines = [_line(summary) for root in roots for summary in list_sessions(root)]
+    lines = [line for root in roots for line in _lines(root)]
     return sorted(lines, key=lambda line: (line["started_utc"] or "", line["session"]))
+
+
+def _lines(root: Path) -> list[Line]:
+    """Of one folder, here or elsewhere."""
+    if (address := address_of(root)) is None:
+        return [_line(summary) for summary in list_sessions(root)]
+    with TemporaryDirectory() as stand_ins:
+        lines = [_line(summary) for summary in list_sessions(list_elsewhere(address, Path(stand_ins)))]
+    return [line | {"folder": f"{address.rstrip('/')}/{Path(line['folder']).name}"} for line in lines]
 
 
 def write_catalogue(lines: Sequence[Line], path: Path) -> None:
     """Write a table: ``.parquet`` with types and units, or ``.csv``; an earlier one is replaced as a whole.
 
+    Args:
+        lines: of :func:`catalogue`.
+        path: of the file, or its address.
+
     Raises:
-        ConfigurationError: another kind of file, or PyArrow is not installed.
+        ConfigurationError: another kind of file, or PyArrow is not installed; no such bucket.
         WriteError: it cannot be written.
     """
     check_table(path)
-    write_whole(path, _parquet(lines) if path.suffix.lower() == ".parquet" else _csv(lines))
+    write_anywhere(path, _parquet(lines) if path.suffix.lower() == ".parquet" else _csv(lines))
 
 
 def check_table(path: Path) -> None:

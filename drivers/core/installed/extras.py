@@ -26,6 +26,8 @@ EXTRAS = {
     "rosbags": "ros",
     "cyclonedds": "ros",
     "pxr": "usd",
+    "fsspec": "cloud",
+    "s3fs": "cloud",
 }
 """Top-level modules, and the extra of ``pyproject.toml`` that installs each."""
 

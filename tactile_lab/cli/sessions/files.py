@@ -192,3 +192,45 @@ def bring_in(
         emit_json({"log": str(target), "dimension": log.dimension, "grasps": len(log.grasps), "contacts": touched})
     answer(f"{count(len(log.grasps), 'grasp')} with {count(touched, 'contact')}: {target}")
     say(f"next: tactile-lab reconstruct {target} --out RESULTS")
+
+
+Address = Annotated[str, typer.Argument(metavar="ADDRESS", help="Such as s3://bucket/laboratory.")]
+
+
+def store(
+    session: SessionName,
+    address: Address,
+    root: Root = Path("runs"),
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
+    """Copy a session to an address elsewhere, completely or not at all (docs/cluster.md)."""
+    from sessions.exchange.elsewhere import store_session
+    from tactile_lab.cli.console import answer, emit_json
+
+    del no_input
+    stored = store_session(choose_session(root, session), _checked(address))
+    if as_json:
+        emit_json({"session": stored})
+    answer(stored)
+
+
+def fetch(address: Address, root: Root = Path("runs"), as_json: Json = False, no_input: NoInput = False) -> None:
+    """Copy a session from its address into a folder of sessions, completely or not at all."""
+    from sessions.exchange.elsewhere import fetch_session
+    from tactile_lab.cli.console import answer, emit_json
+
+    del no_input
+    session = fetch_session(_checked(address), root)
+    if as_json:
+        emit_json({"session": str(session.folder)})
+    answer(f"session  {session.folder}")
+
+
+def _checked(text: str) -> str:
+    """An address as it was typed. Raises BadParameter for a path of this computer."""
+    from sessions.exchange.addresses import address_of
+
+    if (address := address_of(text)) is None:
+        raise typer.BadParameter(f"{text!r} is no address: one begins with what kind it is of, as s3://")
+    return address

@@ -21,6 +21,8 @@ app = typer.Typer(help="Recorded sessions: list, show, replay, recover, export a
 app.command("extract")(session_files.extract)
 app.command("export")(session_files.export)
 app.command("import")(session_files.bring_in)
+app.command("store")(session_files.store)
+app.command("fetch")(session_files.fetch)
 app.command("catalogue")(session_catalogue.catalogue)
 app.command("slips")(session_slips.slips)
 
