@@ -22,6 +22,9 @@ _LOCAL = ("file", "local")
 _PACKAGES = {"s3": "s3fs", "s3a": "s3fs"}
 """Packages that addresses need besides ``fsspec``, and that an extra installs."""
 
+_WITHOUT_FOLDERS = frozenset({"s3", "s3a", "gs", "gcs", "az", "abfs", "memory"})
+"""Stores whose folders are but names; to make one could make a bucket."""
+
 
 def address_of(path: Path | str) -> str | None:
     """The address that was typed; None for a path of this computer, which may have lost a slash as a path."""
@@ -64,7 +67,7 @@ class Place:
         self.address = address.rstrip("/")
         with told(self.address):
             self._files, root = url_to_fs(self.address, use_listings_cache=False)
-        self._root = str(root).rstrip("/")
+        self._root, self._has_folders = str(root).rstrip("/"), protocol not in _WITHOUT_FOLDERS
 
     def names(self) -> dict[str, int]:
         """All files below, by their names relative to it, with their sizes; none if there is nothing."""
@@ -89,11 +92,13 @@ class Place:
     def write(self, name: str, content: bytes) -> None:
         """Write a file as a whole."""
         with told(f"{self.address}/{name}"):
+            self._make_folder(name)
             self._files.pipe_file(self._path(name), content)
 
     def put(self, name: str, file: Path) -> None:
         """Copy a file of this computer there."""
         with told(f"{self.address}/{name}"):
+            self._make_folder(name)
             self._files.put_file(str(file), self._path(name))
 
     def get(self, name: str, file: Path) -> None:
@@ -107,6 +112,11 @@ class Place:
         for name in names:
             with suppress(Exception):
                 self._files.rm_file(self._path(name))
+
+    def _make_folder(self, name: str) -> None:
+        """Where folders are more than names, the one of a file must be there before it."""
+        if self._has_folders:
+            self._files.makedirs(self._path(name).rpartition("/")[0], exist_ok=True)
 
     def _path(self, name: str) -> str:
         return f"{self._root}/{name}"

@@ -58,6 +58,13 @@ def test_a_session_is_stored_and_fetched_unchanged(closed, tmp_path):
         fetch_session(address, tmp_path)
 
 
+def test_a_session_is_stored_where_folders_must_be_made(closed, tmp_path):
+    address = store_session(closed, f"file://{tmp_path}/there/runs")
+    assert files(fetch_session(address, tmp_path / "here").folder) == files(closed.folder)
+    (line,) = catalogue([Path(f"file://{tmp_path}/there/runs")])
+    assert line["folder"] == address
+
+
 def test_what_cannot_be_stored_whole_leaves_nothing_there(closed, monkeypatch):
     put = MemoryFileSystem.put_file
 
