@@ -123,8 +123,15 @@ class StandingPlanner:
     def exhausted(self) -> str:
         """Why there is nothing else to do, in words."""
         if self._astray >= _ASTRAY:
-            return f"the object {_FALLEN.format(grasps=self._astray, size=self.felt.in_words())}"
+            return f"the object {_FALLEN.format(grasps=self._astray, size=self.felt.in_words())}{self._thinness}"
         grasps = self.felt.grasps - self._touches
         touches = f", {self._touches} touches" if self._touches else ""
         blocked = f", {self._blocked} approaches were blocked" if self._blocked else ""
         return f"nothing left that the hand can reach: {grasps} grasps{touches}{blocked}; {self.felt.in_words()}"
+
+    @property
+    def _thinness(self) -> str:
+        """That the object is thinner than a fingertip, in words; empty where it is not."""
+        tip_m = 2 * self.hand.radius_m
+        is_thin = min(self.felt.standing_box.size_m) < tip_m
+        return f", thinner than a fingertip of {1e3 * tip_m:.0f} mm" if is_thin else ""

@@ -118,7 +118,13 @@ def test_grasps_that_hardly_meet_what_fits_nothing_end_with_a_fallen_object() ->
     assert meet_one(beside, is_placed=False)
     assert not meet_one(beside, is_placed=False)
     assert beside.exhausted.startswith("the object has fallen over or was moved: 2 grasps in a row")
-    assert "mm high" in beside.exhausted
+    assert beside.exhausted.endswith("mm high")
+
+
+def test_a_fallen_rod_is_said_to_be_thin() -> None:
+    beside = planner(box(width_m=0.010, length_m=0.012))
+    beside._astray = 2
+    assert beside.exhausted.endswith("the object is 10 x 12 mm wide and 187 mm high, thinner than a fingertip of 17 mm")
 
 
 def test_one_grasp_beside_the_object_is_no_fall_nor_are_two_that_fit() -> None:
