@@ -14,12 +14,13 @@ from drivers.shadow.device.hand_settings import HandSettings
 from drivers.shadow.device.motor_polling import load_rates
 from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTransport, find_palm
 from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
-from drivers.shadow.model.gains import load_gains
+from drivers.shadow.model.gains import GainTable, load_gains
 from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.hand_info import HandInfo, HandStatement, check_map, load_infos, told_form, told_serial
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_configuration import load_configurations
+from drivers.shadow.protocol.motor_data import MAX_PWM
 from drivers.shadow.protocol.palm_images import PalmName
 
 Master = Literal["own", "pysoem"]
@@ -68,8 +69,18 @@ class HandSetup(StrictModel):
         """How the hand is driven, with the polling rates and gains of the files. Raises ConfigurationError."""
         changes: dict[str, object] = {} if self.rates is None else {"polling": load_rates(self.rates)}
         if self.gains is not None:
-            changes["gains"] = load_gains(self.gains, self.form().driven).table
+            changes["gains"] = self._gains(self.gains)
         return self.hand.model_copy(update=changes)
+
+    def _gains(self, file: Path) -> GainTable:
+        driven = self.form().driven
+        table = load_gains(file, driven).table
+        strongest = max(driven, key=lambda joint: table.of(joint).max_pwm)
+        if self.hand.demand == "pwm" and (most := table.of(strongest).max_pwm) > MAX_PWM:
+            what = f"max_force of {strongest} is {most:g}, but the largest duty cycle is {MAX_PWM}"
+            hint = "Name the hand's PWM table, or set hand.demand to torque if this is its table for torques"
+            raise ConfigurationError(what, where=str(file), hint=hint)
+        return table
 
     def transport(self, clock: Clock) -> EthercatTransport | PysoemTransport:
         """The hand's transport, not open; to a palm that is :meth:`known`.

@@ -138,6 +138,9 @@ def _agreed_side(told: Mapping[str, Side]) -> Side:
 def _check_fingers(form: HandForm, fingers: tuple[str, ...], where: str, motors: Path) -> None:
     if set(fingers) == set(form.fingers):
         return
+    if unknown := [finger for finger in fingers if finger not in FINGERS]:
+        hint = f"Fingers are {', '.join(FINGERS)}"
+        raise ConfigurationError(f"names a finger that there is not: {', '.join(unknown)}", where=where, hint=hint)
     named, driven = (", ".join(finger for finger in FINGERS if finger in some) for some in (fingers, form.fingers))
     what = f"says that the hand's fingers are {named}, but {motors} has motors for {driven}"
     raise ConfigurationError(what, where=where, hint="Name the motor map of this very hand, and its fingers")

@@ -32,6 +32,8 @@ Table = Sequence[tuple[float, float]]
 CoupledTable = Sequence[tuple[tuple[float, float], float, float]]
 """Calibration points ((counts of A, counts of B), degrees of A, degrees of B) of two joints."""
 
+_LARGEST_count, _LARGEST_deg = 4095, 180
+
 _AVERAGED = {"THJ5": ("THJ5A", "THJ5B"), "WRJ1": ("WRJ1A", "WRJ1B")}
 
 
@@ -98,6 +100,7 @@ class JointCalibration:
         content = load_parameters(path, _CalibrationFile)
         _refuse_repeats([joint for joint, _ in content.sr_calibrations], str(path))
         _refuse_repeats([joint for pair, _ in content.sr_calibrations_coupled for joint in pair], str(path))
+        _refuse_typing_errors(content, str(path))
         return cls(dict(content.sr_calibrations), dict(content.sr_calibrations_coupled), str(path), joints)
 
     def angles_rad(self, sensors: NDArray[np.uint16] | Array) -> Array:
@@ -194,6 +197,20 @@ def _refuse_repeats(joints: Sequence[str], where: str) -> None:
     repeated = sorted(joint for joint, times in Counter(joints).items() if times > 1)
     if repeated:
         raise ConfigurationError(f"calibrates {', '.join(repeated)} more than once", where=where)
+
+
+def _refuse_typing_errors(content: _CalibrationFile, where: str) -> None:
+    """A wrong digit in a table's last point leaves it monotonic: refuse what no sensor reads and no joint turns."""
+    points = [(joint, *point) for joint, table in content.sr_calibrations for point in table]
+    for pair, table in content.sr_calibrations_coupled:
+        points += [(pair[at], counts[at], degrees[at]) for counts, *degrees in table for at in range(2)]
+    for joint, count, degrees in points:
+        if not 0.0 <= count <= _LARGEST_count:
+            what = f"the table of {joint} has {count:g} counts; its sensor reads 0 to {_LARGEST_count}"
+            raise ConfigurationError(what, where=where, hint="Correct the figure, or calibrate the joint anew")
+        if not abs(degrees) <= _LARGEST_deg:
+            what = f"the table of {joint} has {degrees:g} degrees; no joint turns by more than {_LARGEST_deg}"
+            raise ConfigurationError(what, where=where, hint="Correct the figure, or calibrate the joint anew")
 
 
 def _joint_from_sensor() -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -158,10 +159,12 @@ def _check_one_to_one(numbers: Mapping[str, int], backwards: tuple[str, ...], wh
         raise ConfigurationError(f"no motor for {', '.join(missing)}", where=where, hint=hint)
     if backwards_only := sorted(set(backwards) - set(numbers)):
         raise ConfigurationError(f"reverses {', '.join(backwards_only)} without a motor", where=where, hint=hint)
-    if len(set(numbers.values())) < len(numbers) or not set(numbers.values()) <= set(range(MOTORS)):
-        raise ConfigurationError(
-            f"the motor numbers must be among 0 to {MOTORS - 1}, each once", where=where, hint=hint
-        )
+    times = Counter(numbers.values())
+    if wrong := [
+        f"{name} {motor}" for name, motor in numbers.items() if motor not in range(MOTORS) or times[motor] > 1
+    ]:
+        what = f"the motor numbers must be among 0 to {MOTORS - 1}, each once, not {', '.join(wrong)}"
+        raise ConfigurationError(what, where=where, hint=hint)
 
 
 def _missing_motors(named: set[str]) -> list[str]:

@@ -2,56 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from drivers.core.clock import VirtualClock
 from drivers.core.errors import ConfigurationError, DeviceError
-from drivers.emulators.ethercat.shadow_chain import ChainSettings, emulated_hand
-from drivers.shadow.device.first_move import MoveFinding, check_motor_map
-from drivers.shadow.device.hand import ShadowHand
-from drivers.shadow.device.hand_samples import HandSample
 from drivers.shadow.device.hand_settings import HandSettings
 from drivers.shadow.device.hand_setup import HandSetup
-from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTransport
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
+from tests.support.emulated_hands import EmulatedBench, setup_of
+from tests.support.hand_family import DEFECTS, family, write_hand
 from tests.support.hand_folders import FOLDERS, FULL_RIGHT, HandFolder, write_folder
-from tests.support.memory_port import MemoryPort
 
 LITE = next(kind for kind in FOLDERS if kind.name == "rh_lite_v1")
-
-
-def setup_of(folder: HandFolder, serial: int | None = None) -> HandSetup:
-    ethercat, hand = EthercatSettings(interface="memory", serial=serial), HandSettings(cycle_s=0.002, palm=folder.palm)
-    files = {"joints": folder.joints, "motors": folder.motors, "gains": folder.gains}
-    return HandSetup(ethercat=ethercat, hand=hand, **files)
-
-
-class Bench:
-    """A hand by its files, and the emulated one that the files describe."""
-
-    def __init__(self, setup: HandSetup, serial: int = 634) -> None:
-        self.clock, self.setup = VirtualClock(), setup
-        setup.check_files()
-        chain = ChainSettings(palm=setup.hand.palm, serial=serial)
-        self.motors = setup.motor_map()
-        self.emulated = emulated_hand(self.clock, setup.calibration(), chain, self.motors)
-        port = MemoryPort(self.emulated.ring)
-        transport = EthercatTransport("hand", setup.wiring(), self.clock, port)
-        self.hand: ShadowHand = setup.device(transport, self.clock)
-
-    def cycle(self) -> HandSample:
-        self.clock.sleep_until_ns(self.clock.now_ns() + 2_000_000)
-        return self.hand.exchange()
-
-    def moves(self) -> Iterator[MoveFinding]:
-        self.hand.connect()
-        yield from check_motor_map(self.hand, self.motors, self.cycle, self.clock)
-        assert self.hand.health() == ()
-        self.hand.close()
 
 
 QUICK = ("rh_E_v4", "lh_E_v5", "rh_lite_v1", "rh_extra_lite_v1", "rh_E_v3_no_mf_rf_lf")
@@ -60,7 +25,7 @@ KINDS = [pytest.param(kind, id=kind.name, marks=[] if kind.name in QUICK else py
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_motor_that_a_hand_has_moves_its_own_joint(tmp_path: Path, kind: HandFolder) -> None:
-    findings = list(Bench(setup_of(write_folder(tmp_path, kind))).moves())
+    findings = EmulatedBench(setup_of(write_folder(tmp_path, kind))).moves()
     assert {finding.joint for finding in findings} == set(kind.numbers)
     assert all(finding.ok for finding in findings)
 
@@ -68,11 +33,11 @@ def test_every_motor_that_a_hand_has_moves_its_own_joint(tmp_path: Path, kind: H
 @pytest.mark.parametrize("palm", ["0230", "0240", "0250"])
 def test_other_palms_drive_the_same_motors(tmp_path: Path, palm: str) -> None:
     kind = HandFolder(LITE.name, LITE.numbers, palm=palm, backwards=("FFJ3", "THJ4"))  # type: ignore[arg-type]
-    assert all(finding.ok for finding in Bench(setup_of(write_folder(tmp_path, kind))).moves())
+    assert all(finding.ok for finding in EmulatedBench(setup_of(write_folder(tmp_path, kind))).moves())
 
 
 def test_a_joint_that_a_hand_does_not_have_has_no_target_and_stays_at_zero(tmp_path: Path) -> None:
-    bench = Bench(setup_of(write_folder(tmp_path, LITE)))
+    bench = EmulatedBench(setup_of(write_folder(tmp_path, LITE)))
     bench.hand.connect()
     sample = bench.cycle()
     assert not sample.joints_rad[~bench.setup.calibration().has_joint].any()
@@ -87,7 +52,7 @@ def test_the_folder_of_another_serial_number_is_refused_before_anything_moves(tm
     with pytest.raises(ConfigurationError, match="names hand 554, but its files are those of hand 378"):
         setup_of(folder, serial=554).check_files()
     with pytest.raises(DeviceError, match="hand 634, not hand 378"):
-        Bench(setup_of(folder)).hand.connect()
+        EmulatedBench(setup_of(folder)).hand.connect()
 
 
 @pytest.mark.parametrize(
@@ -97,7 +62,20 @@ def test_the_folder_of_another_serial_number_is_refused_before_anything_moves(tm
         ("joints", ("sr_calibrations:", "sr_calibratons:"), r"calibration.yaml: .*sr_calibratons"),
         ("gains", ("rh_MFJ4", "rh_MFJ9"), r"PWM.yaml: missing or unknown: MFJ4, MFJ9"),
         ("gains", ("max_force: 500.0", "max_force: nan"), r"PWM.yaml, .*max_force"),
-        ("motors", ("- 13", "- 11"), r"rh_E_v3.yaml: the motor numbers must be among 0 to 19, each once"),
+        ("joints", ("- 2487", "- 24870"), r"calibration.yaml: the table of \w+ has 24870 counts; its sensor reads 0"),
+        ("joints", ("- 90\n", "- 900\n"), r"calibration.yaml: the table of \w+ has 900 degrees; no joint turns"),
+        ("gains", ("max_force: 500.0", "max_force: 5000.0"), r"PWM.yaml: max_force of FFJ0 is 5000, but the largest"),
+        ("info", ("- ff\n", "- fff\n"), r"general_info.yaml: names a finger that there is not: FFF. Fingers are FF"),
+        (
+            "motors",
+            ("- 13", "- 25"),
+            r"the motor numbers must be among 0 to 19, each once, not MFJ4 25\.",
+        ),
+        (
+            "motors",
+            ("- 13", "- 11"),
+            r"the motor numbers must be among 0 to 19, each once, not \w+ 11, \w+ 11\.",
+        ),
         ("motors", ("- 17", "- -1"), r"rh_E_v3.yaml: no motor for RFJ4"),
     ],
 )
@@ -107,6 +85,22 @@ def test_a_typing_error_in_a_file_is_named(tmp_path: Path, file: str, change: tu
     place.write_text(place.read_text().replace(*change, 1))
     with pytest.raises(ConfigurationError, match=words):
         setup_of(folder).check_files()
+
+
+def test_the_family_has_the_published_proportions() -> None:
+    hands = family()
+    assert len(hands) == 121
+    assert sum(hand.kind.side == "left" and len(hand.kind.fingers) == 5 for hand in hands) == 25
+    assert sum(len(hand.kind.fingers) < 5 for hand in hands) == 24
+    assert sum(bool(hand.defect) for hand in hands) == 10
+
+
+@pytest.mark.parametrize("defect", DEFECTS)
+def test_a_defect_of_a_calibration_is_named_with_its_file(tmp_path: Path, defect: str) -> None:
+    """All 121 hands: ``python -m tests.support.hand_family_table``."""
+    hand = next(hand for hand in family() if hand.defect == defect)
+    with pytest.raises(ConfigurationError, match=rf"{hand.serial}/calibrations/calibration\.yaml.*J\d"):
+        setup_of(write_hand(tmp_path, hand)).check_files()
 
 
 def published(lab_data: Path) -> list[Path]:
@@ -132,7 +126,7 @@ def setup_of_published(folder: Path, maps: Path) -> HandSetup:
 def outcome(setup: HandSetup, serial: int) -> str:
     """``moved``, or why not."""
     try:
-        findings = list(Bench(setup, serial).moves())
+        findings = EmulatedBench(setup, serial).moves()
     except ConfigurationError as error:
         return str(error)
     wrong = [str(finding) for finding in findings if not finding.ok]
