@@ -14,6 +14,7 @@ from drivers.core.configuration import StrictModel, load, validate
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import Vector3
+from drivers.shadow.protocol.palm_images import Side
 
 Square3 = tuple[Vector3, Vector3, Vector3]
 Six = tuple[float, float, float, float, float, float]
@@ -45,6 +46,7 @@ class FingertipData(StrictModel):
     """A file of wrenches of one finger.
 
     Attributes:
+        side: of the hand.
         free: untouched, in several orientations.
         presses: on a level plate from above, force upwards, in several orientations (rolled about).
     """
@@ -53,6 +55,7 @@ class FingertipData(StrictModel):
     rig: str = Field(min_length=1)
     finger: Literal["FF", "MF", "RF", "LF", "TH"]
     serial: str = ""
+    side: Side = "right"
     free: tuple[WrenchPose, ...]
     presses: tuple[WrenchPose, ...]
 

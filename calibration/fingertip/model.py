@@ -24,6 +24,7 @@ from drivers.core.contacts import FINGERS, Array
 from drivers.core.fingertip import GRAVITY, FingertipCalibration
 from drivers.shadow.closing.posture import finger_joints
 from drivers.shadow.model.kinematics import JOINT_INDEX, palm_T_distal_matrices
+from drivers.shadow.protocol.palm_images import Side
 
 Part: TypeAlias = Literal["mounting", "mass", "com", "centre", "semi_axes"]
 
@@ -123,7 +124,7 @@ class _Problem:
         self._mass_kg, self._shape_m = before.mass_kg, 1e-3 * noise.shape_mm
         self._scale = np.concatenate([_SCALE, np.ones(3 * len(data.presses))])
         self._whiten_force, self._whiten_torque = self._whitening(data, before, noise)
-        self._whiten_joints = np.linalg.inv(np.linalg.cholesky(orientation_covariance(data.finger, noise)))
+        self._whiten_joints = np.linalg.inv(np.linalg.cholesky(orientation_covariance(data.finger, noise, data.side)))
 
     def _whitening(self, data: FingertipData, before: FingertipCalibration, noise: FingertipNoise) -> tuple[Array, ...]:
         """Inverse roots of the readings' covariances, forces' and torques', shape (n, n) each, the axes alike."""
@@ -195,12 +196,12 @@ def lowest(shape: Array, up: Array) -> Array:
     return np.asarray(centre - axes**2 * up / np.linalg.norm(axes * up, axis=1, keepdims=True))
 
 
-def orientation_covariance(finger: str, noise: FingertipNoise) -> Array:
+def orientation_covariance(finger: str, noise: FingertipNoise, side: Side = "right") -> Array:
     """Of the distal frame's orientation by the joints' offsets and the level, distal axes, rad^2, shape (3, 3)."""
     angles = np.zeros((1 + len(finger_joints(finger)), len(JOINT_INDEX)))
     for row, joint in enumerate(finger_joints(finger)):
         angles[1 + row, JOINT_INDEX[joint]] = _STEP_rad
-    links = palm_T_distal_matrices(angles)[:, FINGERS.index(finger), :3, :3]
+    links = palm_T_distal_matrices(angles, side)[:, FINGERS.index(finger), :3, :3]
     turns = np.array([Rot3.Logmap(Rot3(links[0].T @ link)) for link in links[1:]]) / _STEP_rad
     level = np.radians(noise.level_deg) ** 2 * np.eye(3)
     return np.asarray(np.radians(noise.joint_deg) ** 2 * turns.T @ turns + level)

@@ -17,6 +17,7 @@ from calibration.steps.geometry import Patch
 from calibration.steps.observations import Plane
 from drivers.core.contacts import Array
 from drivers.positioner.kinematics import mount_T_forearm
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix
 
 PALM_HEIGHT_m = 0.45
@@ -39,11 +40,13 @@ class PlannedFree:
     Attributes:
         finger: whose wrench is taken; it is stretched.
         pitch_rad, roll_rad: of the positioner.
+        form: the hand.
     """
 
     finger: str
     pitch_rad: float
     roll_rad: float
+    form: HandForm = RIGHT_HAND
 
     @property
     def instruction(self) -> str:
@@ -54,7 +57,7 @@ class PlannedFree:
     def base_q(self, world_T_mount: Pose3, joints_rad: Array) -> Array:
         """Axes of the positioner, shape (6,), with the palm over the world's origin and joints as given, (24,)."""
         turned = np.array([0.0, 0.0, 0.0, 0.0, self.pitch_rad, self.roll_rad])
-        palm = mount_T_forearm(turned).transformFrom(forearm_T_palm_matrix(joints_rad)[:3, 3])
+        palm = mount_T_forearm(turned).transformFrom(forearm_T_palm_matrix(joints_rad, self.form.side)[:3, 3])
         place = world_T_mount.transformTo(np.array([0.0, 0.0, PALM_HEIGHT_m]))
         return np.asarray(turned + np.concatenate([place - palm, np.zeros(3)]))
 
@@ -62,22 +65,24 @@ class PlannedFree:
 PlannedWrench: TypeAlias = PlannedFree | PlannedTouch
 
 
-def plan_wrenches(finger: str, presses: int = 10) -> tuple[PlannedWrench, ...]:
+def plan_wrenches(finger: str, presses: int = 10, form: HandForm = RIGHT_HAND) -> tuple[PlannedWrench, ...]:
     """Orientations without a touch, then presses on the table's top, z = 0 of the world, near its origin.
 
     Args:
         finger: a long finger.
         presses: how many.
+        form: the hand; a left one is turned the other way round.
     """
-    free = [PlannedFree(finger, *np.radians(turn).tolist()) for turn in TURNS_deg]
-    return (*free, *(_press(finger, index, presses) for index in range(presses)))
+    turns = [np.radians((pitch, form.handedness * roll)).tolist() for pitch, roll in TURNS_deg]
+    free = [PlannedFree(finger, pitch, roll, form) for pitch, roll in turns]
+    return (*free, *(_press(finger, index, presses, form) for index in range(presses)))
 
 
-def _press(finger: str, index: int, count: int) -> PlannedTouch:
+def _press(finger: str, index: int, count: int, form: HandForm) -> PlannedTouch:
     """One turn about the finger after the other, to one side with a small lean and back with a large one."""
     share = 4.0 * (index + 0.5) / count - 1.0  # -1..1 on the way there, 1..3 on the way back
-    turn = ROLLED_rad * (share if share <= 1.0 else 2.0 - share)
+    turn = form.handedness * ROLLED_rad * (share if share <= 1.0 else 2.0 - share)
     lean = LEANS_rad[int(share > 1.0)]
     top = Plane("table top", np.zeros(3), np.array([0.0, 0.0, 1.0]), 1e-4)
     rotation = Rot3.Ypr(0.0, np.pi / 2 - lean, turn).matrix() @ _DISTAL_AT_ZERO
-    return PlannedTouch(finger, Patch(top, np.zeros(3), np.zeros((2, 3))), np.zeros(3), rotation)
+    return PlannedTouch(finger, Patch(top, np.zeros(3), np.zeros((2, 3))), np.zeros(3), rotation, form=form)

@@ -85,7 +85,7 @@ class BoardProblem:
         noise: BoardNoise | None = None,
     ) -> None:
         self.views, self.noise = tuple(views), noise or BoardNoise()
-        self.joints = joints_of([link])
+        self.joints = joints_of([link], views[0].pose.form)
         self._camera, self._markers, self._link = camera, markers, link
         self._glass = Glass(markers.glass_thickness_m, markers.glass_index)
         self._world_m = transform_points(markers.world_T_worldmarker.pose(), markers.world_corners_m)

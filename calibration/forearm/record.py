@@ -18,6 +18,7 @@ from calibration.store.store import VALID_DAYS, CalibrationRecord, Covariance, n
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform
+from drivers.shadow.model.hand_form import HandForm
 
 
 def check_origin(data: ForearmData, here: Installation, where: str) -> None:
@@ -29,6 +30,13 @@ def check_origin(data: ForearmData, here: Installation, where: str) -> None:
         if here.devices.get(device, serial) != serial:
             what = f"was recorded with {device} {serial}, not {here.devices[device]}"
             raise ConfigurationError(what, where=where, hint=hint)
+
+
+def check_hand(data: ForearmData, form: HandForm, where: str) -> None:
+    """Refuse touches and pictures of a hand of another form. Raises ConfigurationError."""
+    if (data.touches or data.views) and data.form != form:
+        what = f"was recorded with a {data.form}, but the rig has a {form}"
+        raise ConfigurationError(what, where=where, hint="Give the rig of the recording with --rig")
 
 
 def record_of(

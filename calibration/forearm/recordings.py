@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from gtsam import Pose3
-from pydantic import Field, RootModel
+from pydantic import AfterValidator, Field, RootModel
 
 from calibration.forearm.pose_streams import STREAMS_FORMAT, Matrix, PoseStreams, read_streams, rigid_pose
 from calibration.steps.observations import HandPose, Plane, PosePair, Spot, Target, Touch, View
@@ -27,7 +27,10 @@ from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform, Vector3
 from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
 from drivers.core.reading.json_text import parse_json
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINTS
+from drivers.shadow.model.motors import DRIVEN_JOINTS
+from drivers.shadow.protocol.palm_images import Side
 
 FORMAT = "tactile-forearm-data/1"
 
@@ -35,6 +38,12 @@ Six = tuple[float, float, float, float, float, float]
 Joints = Annotated[tuple[float, ...], Field(min_length=len(JOINTS), max_length=len(JOINTS))]
 Square3 = tuple[Vector3, Vector3, Vector3]
 Pixel = tuple[float, float]
+
+
+def _driven_joint(name: str) -> str:
+    if name not in DRIVEN_JOINTS:
+        raise ValueError(f"no motor drives {name}; driven joints are {', '.join(DRIVEN_JOINTS)}")
+    return name
 
 
 class PlaneEntry(StrictModel):
@@ -85,6 +94,8 @@ class DataFile(StrictModel):
     format: Literal["tactile-forearm-data/1"] = "tactile-forearm-data/1"
     rig: str = Field(min_length=1)
     devices: dict[str, str] = Field(default_factory=dict)
+    side: Side = "right"
+    driven: tuple[Annotated[str, AfterValidator(_driven_joint)], ...] = DRIVEN_JOINTS
     guess: RigidTransform = RigidTransform(translation_m=(0.0, 0.0, 0.0))
     touches: tuple[TouchEntry, ...] = ()
     views: tuple[ViewEntry, ...] = ()
@@ -103,6 +114,7 @@ class ForearmData:
 
     Attributes:
         rig, devices: what they were recorded on; empty if unknown.
+        form: of the hand.
         guess: approximate pose of the mount.
         touches, views, pairs, streams: one of them; pairs too for streams, at the offset that their motion suggests.
         link: what carries the board in the views.
@@ -111,6 +123,7 @@ class ForearmData:
 
     rig: str = ""
     devices: dict[str, str] = field(default_factory=dict)
+    form: HandForm = RIGHT_HAND
     guess: Pose3 = field(default_factory=Pose3)
     touches: tuple[Touch, ...] = ()
     views: tuple[View, ...] = ()
@@ -142,12 +155,14 @@ def load_data(path: Path) -> ForearmData:
         raise ConfigurationError("needs either touches or views", where=str(path))
     if file.views and (file.camera is None or file.markers is None):
         raise ConfigurationError("views need camera and markers", where=str(path))
+    form = HandForm(file.side, file.driven)
     return ForearmData(
         rig=file.rig,
         devices=file.devices,
+        form=form,
         guess=file.guess.pose(),
-        touches=tuple(map(_touch, file.touches)),
-        views=tuple(_view(entry, index, str(path)) for index, entry in enumerate(file.views)),
+        touches=tuple(_touch(entry, form) for entry in file.touches),
+        views=tuple(_view(entry, form, index, str(path)) for index, entry in enumerate(file.views)),
         link=file.link,
         camera=file.camera,
         markers=file.markers,
@@ -160,6 +175,8 @@ def save_data(path: Path, data: ForearmData) -> None:
     file = DataFile(
         rig=data.rig,
         devices=data.devices,
+        side=data.form.side,
+        driven=data.form.driven,
         guess=RigidTransform(translation_m=_three(data.guess.translation()), rpy_rad=(roll, pitch, yaw)),
         touches=tuple(map(_touch_entry, data.touches)),
         views=tuple(map(_view_entry, data.views)),
@@ -188,10 +205,10 @@ def _pairs(matrices: Sequence[tuple[Matrix, Matrix]], where: str) -> tuple[PoseP
     )
 
 
-def _touch(entry: TouchEntry) -> Touch:
+def _touch(entry: TouchEntry, form: HandForm) -> Touch:
     return Touch(
         finger=entry.finger,
-        pose=HandPose(np.array(entry.base_q), np.array(entry.joints_rad)),
+        pose=HandPose(np.array(entry.base_q), np.array(entry.joints_rad), form),
         point_distal_m=np.array(entry.point_distal_m),
         normal_distal=np.array(entry.normal_distal),
         point_covariance_m2=np.array(entry.point_covariance_m2),
@@ -207,12 +224,12 @@ def _target(entry: PlaneEntry | SpotEntry) -> Target:
     return Plane(entry.name, np.array(entry.point_world_m), normal / np.linalg.norm(normal), entry.sigma_m)
 
 
-def _view(entry: ViewEntry, index: int, where: str) -> View:
+def _view(entry: ViewEntry, form: HandForm, index: int, where: str) -> View:
     if len(entry.board_m) != len(entry.board_px) or len(entry.board_m) < 4:
         what = f"view {index + 1} needs as many pixels as corners, and at least four"
         raise ConfigurationError(what, where=where, hint="Check board_m and board_px")
     return View(
-        pose=HandPose(np.array(entry.base_q), np.array(entry.joints_rad)),
+        pose=HandPose(np.array(entry.base_q), np.array(entry.joints_rad), form),
         board_m=np.array(entry.board_m),
         board_px=np.array(entry.board_px),
         world_px=None if entry.world_px is None else np.array(entry.world_px),

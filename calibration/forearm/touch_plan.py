@@ -1,7 +1,8 @@
 """A plan of touches: which finger presses what, from where, with the hand turned how.
 
 The hand points down with one finger stretched, the others bent away. So an error of a joint moves the tip sideways in
-the hand, and turning the hand about the finger separates it from an error of the mount.
+the hand, and turning the hand about the finger separates it from an error of the mount. A left hand turns the other way
+round: each of its touches is the mirror image of a right hand's.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from calibration.steps.observations import Plane
 from drivers.core.contacts import FINGERS, Array
 from drivers.positioner.kinematics import mount_joints
 from drivers.shadow.closing.posture import LONG_FINGERS, TipEllipsoid
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix, joint_vector, palm_T_distal_matrices
 
 TURNS_rad = tuple(np.radians([-105.0, -35.0, 35.0, 105.0]))
@@ -45,6 +47,7 @@ class PlannedTouch:
         place_world_m: where, shape (3,).
         world_R_distal: orientation of the fingertip, shape (3, 3).
         flexion_rad: of the finger's J3, J2 and J1; stretched unless given.
+        form: the hand that presses.
     """
 
     finger: str
@@ -52,11 +55,12 @@ class PlannedTouch:
     place_world_m: Array
     world_R_distal: Array
     flexion_rad: Flexion = STRETCHED_rad
+    form: HandForm = RIGHT_HAND
 
     @property
     def joints_rad(self) -> Array:
         """The hand's joints for it, shape (24,)."""
-        return pointing_vector(self.finger, self.flexion_rad)
+        return pointing_vector(self.finger, self.flexion_rad, self.form)
 
     @property
     def instruction(self) -> str:
@@ -73,33 +77,34 @@ class PlannedTouch:
 
     def base_q(self, world_T_mount: Pose3, joints_rad: Array, tip: TipEllipsoid, off_m: float = 0.0) -> Array:
         """Axes of the positioner for it, shape (6,), with the hand's joints at ``joints_rad``, shape (24,)."""
-        forearm_T_distal = (
-            forearm_T_palm_matrix(joints_rad) @ palm_T_distal_matrices(joints_rad)[FINGERS.index(self.finger)]
-        )
+        side = self.form.side
+        palm_T_distal = palm_T_distal_matrices(joints_rad, side)[FINGERS.index(self.finger)]
+        forearm_T_distal = forearm_T_palm_matrix(joints_rad, side) @ palm_T_distal
         mount_T_forearm = world_T_mount.inverse() * self.world_T_distal(tip, off_m) * Pose3(forearm_T_distal).inverse()
         return np.asarray(mount_joints(mount_T_forearm, 0.0))
 
 
-def pointing(finger: str, flexion_rad: Flexion = STRETCHED_rad) -> dict[str, float]:
+def pointing(finger: str, flexion_rad: Flexion = STRETCHED_rad, form: HandForm = RIGHT_HAND) -> dict[str, float]:
     """Joint angles with one long finger stretched (or flexed as given), the others and the thumb aside, radians.
 
-    The others are bent away from a finger that points, and stretched above one that is bent.
+    The others are bent away from a finger that points, and stretched above one that is bent. Joints that the hand does
+    not have are not named.
     """
     angles = dict(_THUMB_AWAY)
     away = _BENT_rad if flexion_rad == STRETCHED_rad else (0.0, 0.0, 0.0)
     for other in LONG_FINGERS:
         shape = flexion_rad if other == finger else away
         angles |= {f"{other}{joint}": angle for joint, angle in zip(("J3", "J2", "J1"), shape, strict=True)}
-    return angles
+    return {joint: angle for joint, angle in angles.items() if joint in form.joints}
 
 
-def pointing_vector(finger: str, flexion_rad: Flexion = STRETCHED_rad) -> Array:
+def pointing_vector(finger: str, flexion_rad: Flexion = STRETCHED_rad, form: HandForm = RIGHT_HAND) -> Array:
     """:func:`pointing` as a joint vector, shape (24,)."""
-    return joint_vector(pointing(finger, flexion_rad))
+    return joint_vector(pointing(finger, flexion_rad, form))
 
 
 def plan_touches(
-    geometry: KnownGeometry, fingers: Sequence[str] = ("FF", "MF"), per_patch: int = 8
+    geometry: KnownGeometry, fingers: Sequence[str] = ("FF", "MF"), per_patch: int = 8, form: HandForm = RIGHT_HAND
 ) -> tuple[PlannedTouch, ...]:
     """Touches of every patch, fingers and turns of the hand in turn, spread over the patch.
 
@@ -107,18 +112,22 @@ def plan_touches(
         geometry: what can be pressed.
         fingers: long fingers to use.
         per_patch: touches of each.
+        form: the hand that presses.
     """
-    found = list(patches(geometry))
-    return tuple(touch for index, patch in enumerate(found) for touch in _of_patch(patch, fingers, per_patch, index))
+    return tuple(
+        touch
+        for number, patch in enumerate(patches(geometry))
+        for touch in _of_patch(patch, fingers, per_patch, number, form)
+    )
 
 
-def _of_patch(patch: Patch, fingers: Sequence[str], count: int, number: int) -> Iterator[PlannedTouch]:
+def _of_patch(patch: Patch, fingers: Sequence[str], count: int, number: int, form: HandForm) -> Iterator[PlannedTouch]:
     for index in range(count):
-        turn = TURNS_rad[(index + number) % len(TURNS_rad)]
+        turn = form.handedness * TURNS_rad[(index + number) % len(TURNS_rad)]
         lean = LEANS_rad[(index // len(TURNS_rad)) % len(LEANS_rad)]
         place = patch.at(*_spread(index, count))
         rotation = orientation(patch, lean, turn, index)
-        yield PlannedTouch(fingers[index % len(fingers)], patch, place, rotation)
+        yield PlannedTouch(fingers[index % len(fingers)], patch, place, rotation, form=form)
 
 
 def _spread(index: int, count: int) -> tuple[float, float]:

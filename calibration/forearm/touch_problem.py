@@ -64,7 +64,7 @@ class TouchProblem:
 
     def __init__(self, touches: Sequence[Touch], noise: TouchNoise | None = None, guess: Pose3 | None = None) -> None:
         self.touches, self.noise = tuple(touches), noise or TouchNoise()
-        self.joints = joints_of([touch.finger for touch in touches])
+        self.joints = joints_of([touch.finger for touch in touches], touches[0].pose.form)
         self._faces = {touch.target.name: touch.target.sigma_m for touch in touches if isinstance(touch.target, Plane)}
         self._start = closed_form(touches, guess or Pose3())
 

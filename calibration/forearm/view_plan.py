@@ -13,10 +13,11 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.core.fingertip import RigidTransform, Vector3
 from drivers.positioner.kinematics import mount_joints
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix, joint_vector
 
 PALM_T_BOARD = RigidTransform(translation_m=(0.010, -0.012, 0.045), rpy_rad=(float(np.pi / 2), 0.0, 0.0))
-"""A board flat on the palm, its print out of the palm and its up along the fingers."""
+"""A board flat on a right palm, its print out of the palm and its up along the fingers."""
 
 _PALM_DOWN = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _THUMB_AWAY = {"THJ5": np.radians(-30.0), "THJ4": 0.1}
@@ -49,10 +50,12 @@ class PlannedView:
     Attributes:
         world_T_palm: where the palm should be.
         joints_rad: joint angles of the hand, shape (24,).
+        form: the hand that shows the board.
     """
 
     world_T_palm: Pose3
     joints_rad: Array
+    form: HandForm = RIGHT_HAND
     kind: Literal["view"] = "view"
 
     @property
@@ -63,14 +66,25 @@ class PlannedView:
 
     def base_q(self, world_T_mount: Pose3) -> Array:
         """Axes of the positioner for it, shape (6,)."""
-        forearm_T_palm = Pose3(forearm_T_palm_matrix(self.joints_rad))
+        forearm_T_palm = Pose3(forearm_T_palm_matrix(self.joints_rad, self.form.side))
         return np.asarray(mount_joints(world_T_mount.inverse() * self.world_T_palm * forearm_T_palm.inverse(), 0.0))
 
 
-def plan_views(settings: ViewSettings | None = None) -> tuple[PlannedView, ...]:
-    """Pictures spread evenly over places, tilts and turns (an additive recurrence, the same every time)."""
+def palm_T_board(form: HandForm) -> RigidTransform:
+    """Where the board belongs on a hand's palm: :data:`PALM_T_BOARD`, or its mirror image."""
+    x_m, *others_m = PALM_T_BOARD.translation_m
+    return PALM_T_BOARD.model_copy(update={"translation_m": (form.handedness * x_m, *others_m)})
+
+
+def plan_views(settings: ViewSettings | None = None, form: HandForm = RIGHT_HAND) -> tuple[PlannedView, ...]:
+    """Pictures spread evenly over places, tilts and turns (an additive recurrence, the same every time).
+
+    Args:
+        settings: how many, and where.
+        form: the hand that shows the board; one without a wrist bends none.
+    """
     settings = settings or ViewSettings()
-    return tuple(_view(settings, _even(index)) for index in range(settings.pictures))
+    return tuple(_view(settings, _even(index), form) for index in range(settings.pictures))
 
 
 def _even(index: int) -> Array:
@@ -79,12 +93,13 @@ def _even(index: int) -> Array:
     return np.asarray(2.0 * ((0.5 + (index + 1) * root ** -np.arange(1.0, 8.0)) % 1.0) - 1.0)
 
 
-def _view(settings: ViewSettings, at: Array) -> PlannedView:
+def _view(settings: ViewSettings, at: Array, form: HandForm) -> PlannedView:
     turn, tilt, towards = settings.turn_rad * at[0], settings.tilt_rad * np.sqrt(abs(at[1])), np.pi * at[2]
     lean = Rot3.Expmap(tilt * np.array([np.cos(towards), np.sin(towards), 0.0])).matrix()
     rotation = lean @ Rot3.Yaw(float(turn)).matrix() @ _PALM_DOWN
     board = np.array(settings.centre_m) + np.array(settings.spread_m) * at[3:6]
-    place = board - rotation @ np.array(PALM_T_BOARD.translation_m)
+    place = board - rotation @ np.array(palm_T_board(form).translation_m)
     bend = settings.wrist_rad * at[6]
-    joints = joint_vector({**_THUMB_AWAY, "WRJ1": float(bend), "WRJ2": float(-bend)})
-    return PlannedView(Pose3(Rot3(rotation), place), joints)
+    angles = {**_THUMB_AWAY, "WRJ1": float(bend), "WRJ2": float(-bend)}
+    joints = joint_vector({joint: angle for joint, angle in angles.items() if joint in form.joints})
+    return PlannedView(Pose3(Rot3(rotation), place), joints, form)

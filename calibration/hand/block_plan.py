@@ -16,6 +16,7 @@ from calibration.steps.geometry import Block, KnownGeometry, Patch, load_geometr
 from drivers.core.contacts import FINGERS as HAND
 from drivers.core.errors import ConfigurationError
 from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix, palm_T_distal_matrices
 
 FINGERS = ("FF", "MF", "RF")
@@ -42,18 +43,23 @@ def load_block(path: Path) -> Block:
     return block
 
 
-def plan_block(block: Block, fingers: Sequence[str] = FINGERS, rounds: int = 1) -> tuple[PlannedTouch, ...]:
+def plan_block(
+    block: Block, fingers: Sequence[str] = FINGERS, rounds: int = 1, form: HandForm = RIGHT_HAND
+) -> tuple[PlannedTouch, ...]:
     """Every finger, in every flexion, on every face of the block that can be pressed.
 
     Args:
         block: at a known place.
         fingers: long fingers.
         rounds: how often all of that, elsewhere on the faces and with the hand turned otherwise.
+        form: the hand that presses.
     """
-    return tuple(touch for number, finger in enumerate(fingers) for touch in _of_finger(block, finger, number, rounds))
+    return tuple(
+        touch for number, finger in enumerate(fingers) for touch in _of_finger(block, finger, number, rounds, form)
+    )
 
 
-def _of_finger(block: Block, finger: str, number: int, rounds: int) -> Iterator[PlannedTouch]:
+def _of_finger(block: Block, finger: str, number: int, rounds: int, form: HandForm) -> Iterator[PlannedTouch]:
     faces = _faces(block)
     for index in range(rounds * len(FLEXIONS_rad) * len(faces)):
         group = index // len(faces)
@@ -61,7 +67,7 @@ def _of_finger(block: Block, finger: str, number: int, rounds: int) -> Iterator[
         first, second = np.sin([2.4 * index + number, 1.7 * index + 2 * number])
         place = patch.at(first, second if patch.normal_world[2] > 0.5 else _high(second))
         ways = (
-            PlannedTouch(finger, patch, place, orientation(patch, lean, turn, index), flexion)
+            PlannedTouch(finger, patch, place, orientation(patch, lean, form.handedness * turn, index), flexion, form)
             for lean in np.roll(_LEANS_rad, index)
             for turn in np.roll(TURNS_rad, index + group + number)
         )
@@ -83,8 +89,8 @@ def _faces(block: Block) -> list[Patch]:
 
 def _height_m(touch: PlannedTouch) -> float:
     """Height of the lower one of palm and forearm above the world's z = 0."""
-    joints = touch.joints_rad
+    joints, side = touch.joints_rad, touch.form.side
     world_T_distal = touch.world_T_distal(TipEllipsoid()).matrix()
-    world_T_palm = world_T_distal @ np.linalg.inv(palm_T_distal_matrices(joints)[HAND.index(touch.finger)])
-    world_T_forearm = world_T_palm @ np.linalg.inv(forearm_T_palm_matrix(joints))
+    world_T_palm = world_T_distal @ np.linalg.inv(palm_T_distal_matrices(joints, side)[HAND.index(touch.finger)])
+    world_T_forearm = world_T_palm @ np.linalg.inv(forearm_T_palm_matrix(joints, side))
     return float(min(world_T_palm[2, 3], world_T_forearm[2, 3]))

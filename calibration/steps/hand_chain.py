@@ -13,7 +13,9 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import FINGERS, Array
 from drivers.positioner.kinematics import mount_T_forearm
 from drivers.shadow.closing.posture import finger_joints
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, forearm_T_palm_matrix, palm_T_distal_matrices
+from drivers.shadow.protocol.palm_images import Side
 
 WRIST = ("WRJ2", "WRJ1")
 _STEP_rad = 1e-5
@@ -33,10 +35,11 @@ class HandNoise(StrictModel):
     base_sigma_m: float = Field(default=1e-4, gt=0.0)
 
 
-def joints_of(links: Sequence[str]) -> tuple[str, ...]:
-    """Joints between the forearm and the named links (``palm`` or a finger), the wrist first."""
+def joints_of(links: Sequence[str], form: HandForm = RIGHT_HAND) -> tuple[str, ...]:
+    """Joints that a hand has between the forearm and the named links (``palm`` or a finger), the wrist first."""
     fingers = [finger for finger in FINGERS if finger in links]
-    return (*WRIST, *(joint for finger in fingers for joint in finger_joints(finger)))
+    joints = (*WRIST, *(joint for finger in fingers for joint in finger_joints(finger)))
+    return tuple(joint for joint in joints if joint in form.joints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +74,19 @@ def link_motion(pose: HandPose, link: str, joints: Sequence[str], offsets_rad: A
     steps = np.zeros((2 * len(columns) + 1, len(JOINTS)))
     for row, column in enumerate(columns):
         steps[1 + 2 * row, column], steps[2 + 2 * row, column] = -_STEP_rad, _STEP_rad
-    links = mount_T_forearm(pose.base_q).matrix() @ _forearm_T_link(angles + steps, link)
+    links = mount_T_forearm(pose.base_q).matrix() @ _forearm_T_link(angles + steps, link, pose.form.side)
     return LinkMotion(links[0], (links[1::2] - links[2::2]) / (2 * _STEP_rad))
 
 
 def mount_T_link(pose: HandPose, link: str) -> Array:
     """A link in the mount's frame as measured, shape (4, 4)."""
-    return np.asarray(mount_T_forearm(pose.base_q).matrix() @ _forearm_T_link(pose.joints_rad[None], link)[0])
+    return np.asarray(
+        mount_T_forearm(pose.base_q).matrix() @ _forearm_T_link(pose.joints_rad[None], link, pose.form.side)[0]
+    )
 
 
-def _forearm_T_link(joints_rad: Array, link: str) -> Array:
-    forearm_T_palm = forearm_T_palm_matrix(joints_rad)
+def _forearm_T_link(joints_rad: Array, link: str, side: Side) -> Array:
+    forearm_T_palm = forearm_T_palm_matrix(joints_rad, side)
     if link == "palm":
         return forearm_T_palm
-    return np.asarray(forearm_T_palm @ palm_T_distal_matrices(joints_rad)[:, FINGERS.index(link)])
+    return np.asarray(forearm_T_palm @ palm_T_distal_matrices(joints_rad, side)[:, FINGERS.index(link)])

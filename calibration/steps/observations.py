@@ -9,6 +9,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,10 +19,12 @@ class HandPose:
     Attributes:
         base_q: axes of the positioner, shape (6,), metres and radians.
         joints_rad: joint angles of the hand, shape (24,).
+        form: which hand it is.
     """
 
     base_q: Array
     joints_rad: Array
+    form: HandForm = RIGHT_HAND
 
 
 @dataclass(frozen=True, eq=False)

@@ -158,16 +158,19 @@ class PressingHand:
 
     def _take_posture(self, joints_rad: Array) -> None:
         """Joints to a posture, straight in joint space."""
-        wanted = motor_targets(dict(zip(JOINTS, joints_rad.tolist(), strict=True)))
-        start = self._targets_rad or motor_targets(
-            dict(zip(JOINTS, self.runtime.perception.joints_rad.tolist(), strict=True))
-        )
+        wanted = self._targets_of(joints_rad)
+        start = self._targets_rad or self._targets_of(self.runtime.perception.joints_rad)
         way = max(abs(wanted[name] - start[name]) for name in wanted)
         if way > 0.0:
             for share in self._motion.shares(way / self.settings.fingers_rad_s):
                 self.runtime.hand.set_targets({n: (1 - share) * start[n] + share * wanted[n] for n in wanted})
                 self._motion.tick()
         self._targets_rad = wanted
+
+    def _targets_of(self, joints_rad: Array) -> dict[str, float]:
+        """Targets of the motors that the hand has."""
+        targets = motor_targets(dict(zip(JOINTS, joints_rad.tolist(), strict=True)))
+        return {name: targets[name] for name in self.runtime.perception.form.driven}
 
     def _mean_pose(self, duration_s: float, each: Callable[[], object] = lambda: None) -> HandPose:
         """Joints of hand and positioner, averaged over a time; ``each`` is called in every cycle."""
@@ -177,7 +180,7 @@ class PressingHand:
             joints.append(seen.joints_rad)
             base.append(seen.base_q)
             each()
-        return HandPose(np.mean(base, axis=0), np.mean(joints, axis=0))
+        return HandPose(np.mean(base, axis=0), np.mean(joints, axis=0), seen.form)
 
 
 class CalibrationMeasurer(PressingHand):

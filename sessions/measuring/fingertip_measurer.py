@@ -56,7 +56,7 @@ class FingertipMeasurer(PressingHand):
         return taken
 
     def _free(self, planned: PlannedFree) -> WrenchPose:
-        joints = pointing_vector(planned.finger)
+        joints = pointing_vector(planned.finger, form=planned.form)
         target = planned.base_q(self._world_T_mount, joints)
         if self._q[2] < target[2]:
             self._move(np.array([*self._q[:2], target[2], *self._q[3:]]), self.settings.travel_m_s)

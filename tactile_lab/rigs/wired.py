@@ -20,7 +20,7 @@ from drivers.fingertips.kinds import WIRES
 from drivers.fingertips.wiring import make_wire
 from drivers.force.wire_settings import WireSettings
 from drivers.shadow.device.hand_setup import HandSetup
-from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
+from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.hand_info import HandStatement, load_infos, told_form
 from drivers.shadow.protocol.palm_images import USUAL_PALM
 from drivers.simulation.settings import SimulationSettings
@@ -78,21 +78,6 @@ def hand_form(rig: Rig) -> HandForm:
     where = f"{rig.source}: hand"
     infos = load_infos(rig.files[role] for role in _HAND_FILES if role in rig.files)
     return told_form(rig.files["motors"], infos, HandStatement(where, stated.side, stated.fingers))
-
-
-def require_right_hand(rig: Rig) -> None:
-    """Refuse to calibrate with a hand of another form: the calibrations' plans and problems are the full right hand's.
-
-    Raises:
-        ConfigurationError: it is a left hand, or one with fewer joints.
-    """
-    if (form := hand_form(rig)) != RIGHT_HAND:
-        what = f"has a {form}: calibrations that move the hand are made for right hands with five fingers and a wrist"
-        hint = (
-            "Measure the forearm's pose by ruler (calibrate forearm --method manual) or give another program's pose "
-            "pairs (--from); keep the delivered joints and fingertips"
-        )
-        raise ConfigurationError(what, where=rig.source, hint=hint)
 
 
 def with_form(rig: Rig) -> Rig:

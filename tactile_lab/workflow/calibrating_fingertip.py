@@ -16,13 +16,13 @@ from calibration.forearm.placement import load_forearm
 from drivers.core.configuration import StrictModel
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import FingertipCalibration
-from drivers.shadow.closing.posture import LONG_FINGERS
+from drivers.shadow.model.hand_form import HandForm
 from sessions.measuring.fingertip_measurer import FingertipMeasurer, FingertipMeasurerSettings
 from sessions.recording.recorder import TrafficSink
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import connected_runtime
-from tactile_lab.rigs.wired import require_right_hand
+from tactile_lab.rigs.wired import hand_form
 from tactile_lab.workflow.calibrating_forearm import clear_table, tip_shapes
 
 
@@ -76,14 +76,13 @@ def fingertip_wizard(
         DeviceError: the rig is not ready.
     """
     rig = load_rig(request.rig)
-    require_right_hand(rig)
     check_calibration(rig)
-    before = force_fingertips(rig, request.finger)[request.finger]
-    if request.finger not in LONG_FINGERS:
+    before, form = force_fingertips(rig, request.finger)[request.finger], hand_form(rig)
+    if request.finger not in form.long_fingers:
         hint = "Record its wrenches by hand, and give them with --from"
         raise ConfigurationError(f"{request.finger} cannot be stretched on its own", where="--finger", hint=hint)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
-    plan, data = plan_wrenches(request.finger, request.presses), _data(rig, request.finger)
+    plan, data = plan_wrenches(request.finger, request.presses, form), _data(rig, request.finger, form)
     wizard = FingertipWizard(plan, data, before, request.settings.noise)
     with connected_runtime(clear_table(rig), request.seed, "box-10x6x4", onlooker) as runtime:
         measurer = FingertipMeasurer(runtime, world_T_mount, tip_shapes(rig), request.settings.measurer)
@@ -103,9 +102,9 @@ def force_fingertips(rig: Rig, finger: str) -> dict[str, FingertipCalibration]:
     return dict(tips)
 
 
-def _data(rig: Rig, finger: str) -> FingertipData:
+def _data(rig: Rig, finger: str, form: HandForm) -> FingertipData:
     here = rig.installation
     serial = here.devices.get(f"ft/{finger}", "")
     return FingertipData.model_validate(
-        {"rig": here.rig, "finger": finger, "serial": serial, "free": (), "presses": ()}
+        {"rig": here.rig, "finger": finger, "serial": serial, "side": form.side, "free": (), "presses": ()}
     )

@@ -14,7 +14,7 @@ from gtsam import Pose3
 from calibration.forearm.placement import load_forearm
 from calibration.forearm.recordings import ForearmData
 from calibration.forearm.touch_plan import plan_touches
-from calibration.forearm.view_plan import PALM_T_BOARD, ViewSettings, plan_views
+from calibration.forearm.view_plan import ViewSettings, palm_T_board, plan_views
 from calibration.forearm.wizard import ForearmWizard, Planned, WizardSettings
 from calibration.steps.geometry import load_geometry
 from drivers.camera.boards import GridBoard, load_board
@@ -24,7 +24,8 @@ from drivers.camera.targets.chessboard import Chessboard
 from drivers.core.configuration import StrictModel, load_model
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform
-from drivers.shadow.closing.posture import LONG_FINGERS, TipEllipsoid
+from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.model.hand_form import HandForm
 from drivers.simulation.settings import HandBoard, ObjectStart
 from sessions.measuring.calibration_measurer import Board, CalibrationMeasurer, MeasurerSettings
 from sessions.recording.recorder import TrafficSink
@@ -32,6 +33,7 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.laboratory import connected_runtime
+from tactile_lab.rigs.wired import hand_form
 
 _ASIDE = ObjectStart(x_m=0.44, y_m=0.44, yaw_rad=0.0)
 """Where a simulated rig's object lies while the hand calibrates: in a corner of the table."""
@@ -139,11 +141,12 @@ def hand_board(rig: Rig, request: ForearmRequest) -> Board:
 
 
 def _plan(rig: Rig, request: ForearmRequest) -> tuple[Planned, ...]:
+    form = hand_form(rig)
     if request.method == "marker":
         changes = {} if request.pictures is None else {"pictures": request.pictures}
-        return plan_views(request.settings.views.model_copy(update=changes))
-    if unknown := sorted(set(request.fingers) - set(LONG_FINGERS)):
-        hint = f"Press with some of {', '.join(LONG_FINGERS)}"
+        return plan_views(request.settings.views.model_copy(update=changes), form)
+    if unknown := sorted(set(request.fingers) - set(form.long_fingers)):
+        hint = f"Press with some of {', '.join(form.long_fingers)}"
         raise ConfigurationError(f"{', '.join(unknown)} cannot be stretched on its own", where="--fingers", hint=hint)
     if missing := sorted(set(request.fingers) - set(tip_shapes(rig))):
         raise ConfigurationError(f"has no calibrated fingertip on {', '.join(missing)}", where=rig.source)
@@ -151,12 +154,13 @@ def _plan(rig: Rig, request: ForearmRequest) -> tuple[Planned, ...]:
         hint = "Describe the table's edges, a block or marked points in a file, and give it with --geometry"
         raise ConfigurationError("no geometry with a known pose is given", where=rig.source, hint=hint)
     geometry = load_geometry(request.geometry or rig.files["geometry"])
-    return plan_touches(geometry, request.fingers, request.touches)
+    return plan_touches(geometry, request.fingers, request.touches, form)
 
 
 def _data(rig: Rig, method: str) -> ForearmData:
     here = rig.installation
-    data = ForearmData(here.rig, dict(here.devices), load_forearm(rig.files["forearm"]).world_T_mount.pose())
+    guess = load_forearm(rig.files["forearm"]).world_T_mount.pose()
+    data = ForearmData(here.rig, dict(here.devices), hand_form(rig), guess)
     if method == "touch":
         return data
     if "camera" not in rig.files:
@@ -172,7 +176,7 @@ def _prepare(request: ForearmRequest) -> Rig:
     if request.method == "marker" and rig.description.simulation.hand_board is None:
         board = hand_board(rig, request)
         if isinstance(board, GridBoard):
-            changes["hand_board"] = HandBoard(board=board, palm_T_board=_askew(request.seed))
+            changes["hand_board"] = HandBoard(board=board, palm_T_board=_askew(request.seed, hand_form(rig)))
     return clear_table(rig, changes)
 
 
@@ -182,9 +186,9 @@ def clear_table(rig: Rig, changes: Mapping[str, object] | None = None) -> Rig:
     return replace(rig, description=rig.description.model_copy(update={"simulation": simulation}))
 
 
-def _askew(seed: int) -> RigidTransform:
+def _askew(seed: int, form: HandForm) -> RigidTransform:
     rng = np.random.default_rng(seed)
     off = np.concatenate([_ASKEW_rad * rng.standard_normal(3), _ASKEW_m * rng.standard_normal(3)])
-    pose = PALM_T_BOARD.pose() * Pose3.Expmap(off)
+    pose = palm_T_board(form).pose() * Pose3.Expmap(off)
     (x, y, z), (roll, pitch, yaw) = pose.translation().tolist(), pose.rotation().xyz().tolist()
     return RigidTransform(translation_m=(x, y, z), rpy_rad=(roll, pitch, yaw))

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from calibration.forearm.placement import load_forearm
-from calibration.forearm.record import check_origin
+from calibration.forearm.record import check_hand, check_origin
 from calibration.forearm.recordings import FORMAT, ForearmData, load_data
 from calibration.forearm.wizard import solve_forearm
 from calibration.hand.block_plan import FINGERS, load_block, plan_block
@@ -24,7 +24,6 @@ from calibration.steps.refinement import JointOffset
 from calibration.store.store import Covariance
 from drivers.core.configuration import StrictModel, load, load_model
 from drivers.core.errors import ConfigurationError
-from drivers.shadow.closing.posture import LONG_FINGERS
 from drivers.simulation.objects import object_model
 from drivers.simulation.settings import ObjectStart
 from sessions.measuring.calibration_measurer import CalibrationMeasurer, MeasurerSettings
@@ -33,7 +32,7 @@ from sessions.recording.recorder import TrafficSink
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import connected_runtime
-from tactile_lab.rigs.wired import require_right_hand
+from tactile_lab.rigs.wired import hand_form
 from tactile_lab.workflow.calibrating_forearm import clear_table, tip_shapes
 
 BLOCK = "box-12x6x6"
@@ -110,9 +109,9 @@ def from_file(source: Path, rig: Rig, settings: JointSettings) -> FoundJoints:
     here = rig.installation
     if not _holds_touches(source):
         return from_known(load_poses(source, here).poses)
-    require_right_hand(rig)
     data = load_data(source)
     check_origin(data, here, str(source))
+    check_hand(data, hand_form(rig), str(source))
     if not data.touches:
         hint = "Record touches: tactile-lab calibrate joints --record FILE"
         raise ConfigurationError(
@@ -187,14 +186,14 @@ def joint_wizard(request: JointRequest, onlooker: TrafficSink) -> Iterator[tuple
         DeviceError: the rig is not ready.
     """
     rig = load_rig(request.rig)
-    require_right_hand(rig)
     check_calibration(rig)
-    block, tips = _block(rig, request), tip_shapes(rig)
-    if unknown := sorted(set(request.fingers) - (set(LONG_FINGERS) & set(tips))):
-        hint = f"Press with some of {', '.join(LONG_FINGERS)} that have a calibrated fingertip"
+    block, tips, form = _block(rig, request), tip_shapes(rig), hand_form(rig)
+    if unknown := sorted(set(request.fingers) - (set(form.long_fingers) & set(tips))):
+        hint = f"Press with some of {', '.join(form.long_fingers)} that have a calibrated fingertip"
         raise ConfigurationError(f"{', '.join(unknown)} cannot press alone", where="--fingers", hint=hint)
     world_T_mount = load_forearm(rig.files["forearm"]).world_T_mount.pose()
-    wizard = BlockWizard(plan_block(block, request.fingers, request.rounds), request.settings.block)
+    plan = plan_block(block, request.fingers, request.rounds, form)
+    wizard = BlockWizard(plan, request.settings.block)
     with connected_runtime(_with_block(rig, block), request.seed, BLOCK, onlooker) as runtime:
         measurer = CalibrationMeasurer(runtime, world_T_mount, tips, request.settings.measurer)
         yield wizard, measurer

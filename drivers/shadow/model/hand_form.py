@@ -49,6 +49,11 @@ class HandForm:
         return self.side == "left"
 
     @property
+    def handedness(self) -> float:
+        """Factor of what is mirrored from a right hand to a left one: 1 for a right hand, -1 for a left one."""
+        return -1.0 if self.is_left else 1.0
+
+    @property
     def mirrored(self) -> HandForm:
         """The same hand of the other side."""
         return replace(self, side="right" if self.is_left else "left")

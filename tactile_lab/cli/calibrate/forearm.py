@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from calibration.forearm.recordings import ForearmData
     from calibration.forearm.wizard import ForearmResult, ForearmWizard
     from tactile_lab.cli.calibrate.wizard import Asker
+    from tactile_lab.rigs.description import Rig
     from tactile_lab.workflow.calibrating_forearm import CalibrationSettings
 
 
@@ -88,7 +89,6 @@ def forearm(
     from tactile_lab.cli.calibrate.steps import store_result
     from tactile_lab.cli.calibrate.wizard import may_write, wizard
     from tactile_lab.rigs.description import load_rig
-    from tactile_lab.rigs.wired import require_right_hand
 
     here, page = load_rig(rig).installation, PageAddress.if_wanted(view, listen, view_port, token, certificate)
     file = out or Path("calibrations") / here.rig / "forearm.yaml"
@@ -101,10 +101,8 @@ def forearm(
         else:
             wanted = _settings(settings)
             if source is not None:
-                data = _load_recorded(source, here)
-            if source is None or not data.pairs:  # pairs of another program know nothing of the hand's joints
-                require_right_hand(load_rig(rig))
-            if source is None:
+                data = _load_recorded(source, load_rig(rig))
+            else:
                 names = tuple(name.strip() for name in fingers.split(","))
                 data = _measure(asker, wanted, rig, method, seed, geometry, board, names, touches, pictures)
                 if record is not None:
@@ -135,15 +133,16 @@ def _settings(path: Path | None) -> CalibrationSettings:
     return CalibrationSettings() if path is None else load_model(path, CalibrationSettings)
 
 
-def _load_recorded(path: Path, here: object) -> ForearmData:
-    """Recorded poses of this rig. Raises ConfigurationError for those of another rig."""
-    from calibration.forearm.record import check_origin
+def _load_recorded(path: Path, rig: Rig) -> ForearmData:
+    """Recorded poses of this rig. Raises ConfigurationError for those of another rig, or of another hand."""
+    from calibration.forearm.record import check_hand, check_origin
     from calibration.forearm.recordings import load_data
-    from calibration.store.admission import Installation
+    from tactile_lab.rigs.wired import hand_form
 
-    assert isinstance(here, Installation)
     data = load_data(path)
-    check_origin(data, here, str(path))
+    check_origin(data, rig.installation, str(path))
+    if not data.pairs:  # pairs of another program know nothing of the hand's joints
+        check_hand(data, hand_form(rig), str(path))
     return data
 
 

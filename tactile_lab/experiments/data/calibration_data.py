@@ -9,7 +9,7 @@ import numpy as np
 from gtsam import Pose3
 
 from calibration.forearm.touch_plan import PlannedTouch
-from calibration.forearm.view_plan import PALM_T_BOARD, PlannedView
+from calibration.forearm.view_plan import PlannedView, palm_T_board
 from calibration.steps.hand_chain import mount_T_link
 from calibration.steps.observations import HandPose, Touch, View
 from drivers.camera.calibration import CameraCalibration
@@ -18,6 +18,7 @@ from drivers.core.contacts import Array
 from drivers.core.fingertip import RigidTransform
 from drivers.core.poses import transform_points
 from drivers.shadow.closing.posture import TipEllipsoid
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINTS
 
 JOINT_BIAS_rad = float(np.radians(0.6))
@@ -68,11 +69,17 @@ class TrueRig:
         bias = JOINT_BIAS_rad * rng.standard_normal(len(JOINTS))
         return cls(Pose3.Expmap(motion), bias, YIELD_m_N * abs(rng.standard_normal()))
 
-    def measure(self, base_q: Array, joints_rad: Array, rng: np.random.Generator) -> HandPose:
-        """The sensors' readings of a true pose: with bias, and with noise averaged over a press or picture."""
+    def measure(
+        self, base_q: Array, joints_rad: Array, rng: np.random.Generator, form: HandForm = RIGHT_HAND
+    ) -> HandPose:
+        """The sensors' readings of a true pose: with bias, and with noise averaged over a press or picture.
+
+        Joints that the hand does not have read zero.
+        """
         noise = JOINT_NOISE_rad / np.sqrt(SAMPLES) * rng.standard_normal(len(JOINTS))
         shaken = np.repeat([BASE_SIGMA_m, 0.0], 3) * rng.standard_normal(6)
-        return HandPose(base_q + shaken, joints_rad + self.bias_rad + noise)
+        turns = np.isin(JOINTS, form.joints)
+        return HandPose(base_q + shaken, np.where(turns, joints_rad + self.bias_rad + noise, 0.0), form)
 
 
 def touches_of(plan: Sequence[PlannedTouch], rig: TrueRig, rng: np.random.Generator) -> list[Touch]:
@@ -93,7 +100,7 @@ def _touch(planned: PlannedTouch, shift_m: float, rig: TrueRig, rng: np.random.G
     support = axes**2 * inward / np.linalg.norm(axes * inward)
     return Touch(
         finger=planned.finger,
-        pose=rig.measure(base_q, joints, rng),
+        pose=rig.measure(base_q, joints, rng, planned.form),
         point_distal_m=np.array(tip.centre_distal_m) + support + CONTACT_SIGMA_m * rng.standard_normal(3),
         normal_distal=-inward,
         point_covariance_m2=CONTACT_SIGMA_m**2 * np.eye(3),
@@ -109,7 +116,7 @@ def views_of(plan: Sequence[PlannedView], rig: TrueRig, rng: np.random.Generator
     askew = Pose3.Expmap(np.concatenate([0.03 * rng.standard_normal(3), 0.003 * rng.standard_normal(3)]))
     bias_px = CORNER_BIAS_px * rng.standard_normal(2) + CORNER_OWN_px * rng.standard_normal((4, 2))
     board_size, world_size = 1.0 + PRINT_SHARE * rng.standard_normal(2)
-    on_palm = transform_points(PALM_T_BOARD.pose() * askew, board_size * BOARD_m)
+    on_palm = transform_points(palm_T_board(plan[0].form).pose() * askew, board_size * BOARD_m)
     world = transform_points(MARKERS.world_T_worldmarker.pose(), world_size * MARKERS.world_corners_m)
     return [_view(planned, rig, on_palm, world, bias_px, rng) for planned in plan]
 
@@ -118,9 +125,9 @@ def _view(
     planned: PlannedView, rig: TrueRig, on_palm_m: Array, world_m: Array, bias_px: Array, rng: np.random.Generator
 ) -> View:
     base_q = planned.base_q(Pose3())
-    mount_T_palm = Pose3(mount_T_link(HandPose(base_q, planned.joints_rad), "palm"))
+    mount_T_palm = Pose3(mount_T_link(HandPose(base_q, planned.joints_rad, planned.form), "palm"))
     board = transform_points(rig.world_T_mount * mount_T_palm, on_palm_m)
-    pose = rig.measure(base_q, planned.joints_rad, rng)
+    pose = rig.measure(base_q, planned.joints_rad, rng, planned.form)
     return View(pose, BOARD_m, _see(board, rng), _see(world_m, rng) + bias_px)
 
 

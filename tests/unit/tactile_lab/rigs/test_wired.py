@@ -23,7 +23,7 @@ from drivers.shadow.device.hand_settings import HandSettings
 from tactile_lab.rigs.build import build_interpreter, check_calibration
 from tactile_lab.rigs.description import Rig, load_rig, shipped_rigs
 from tactile_lab.rigs.laboratory import WiredLaboratory
-from tactile_lab.rigs.wired import emulation_plan, hand_form, hand_setup, require_right_hand, with_form
+from tactile_lab.rigs.wired import emulation_plan, hand_form, hand_setup, with_form
 from tests.support.wire_rig import SHIPPED, wire_rig
 
 SIMULATED = SHIPPED / "calibrations" / "simulated-hand"
@@ -89,14 +89,6 @@ def test_a_left_hand_is_told_by_its_own_folder_and_a_session_keeps_that(tmp_path
 def test_a_left_hands_files_are_refused_on_a_right_hand_before_anything_is_connected(tmp_path: Path) -> None:
     with pytest.raises(ConfigurationError, match=r"general_info\.yaml: is of a left hand, but .*: hand of a right one"):
         check_calibration(left_rig(tmp_path, side="right"))
-
-
-def test_calibrations_that_move_the_hand_are_refused_for_other_hands() -> None:
-    require_right_hand(load_rig("sim"))
-    with pytest.raises(ConfigurationError, match="has a left hand with FF, MF, RF, LF, TH: calibrations that move"):
-        require_right_hand(load_rig("sim-left"))
-    with pytest.raises(ConfigurationError, match="has a right hand with FF, MF, RF, TH: calibrations that move"):
-        require_right_hand(load_rig("sim-lite"))
 
 
 def test_a_hand_with_two_fingers_cannot_grasp(tmp_path: Path) -> None:
