@@ -43,7 +43,7 @@ class DrivenHand:
         self.clock = VirtualClock()
         self.far = emulated_hand(self.clock, _CALIBRATION)
         self.faults, self.cable = self.far.palm.palm.faults, self.far.ring.faults
-        self.motors = self.far.palm._motors
+        self.motors = self.far.palm.motors
         settings = EthercatSettings(interface="memory", watchdog_s=WATCHDOG_s)
         self.transport = EthercatTransport("hand", settings, self.clock, MemoryPort(self.far.ring))
         self._send, self.demands, self._eased_ns = self.transport.send, np.zeros(20), 0
@@ -114,7 +114,7 @@ class FaultOutcome:
 
 def _flag(flag: MotorFlag) -> HandFault:
     def raise_flag(hand: DrivenHand) -> None:
-        hand.motors._flags[_FFJ3] |= int(flag)
+        hand.motors.raise_flags(_FFJ3, int(flag))
 
     def heard(hand: DrivenHand, since_s: float) -> bool:
         return hand.hand.newest is not None and bool(hand.hand.newest.motor.flags[_FFJ3] & flag)
@@ -170,9 +170,7 @@ FAULTS: dict[str, HandFault] = {
     "flag: H-bridge": _flag(MotorFlag.BRIDGE_FAULT),
     "flag: stored configuration": _flag(MotorFlag.EEPROM_CRC_BAD),
     "flag: too hot": _flag(MotorFlag.OVER_TEMPERATURE),
-    "motor at 57 C": HandFault(
-        lambda hand: hand.motors._celsius.__setitem__(_FFJ3, 57.0), "stopped: 57 C, limit 55 C", _hot
-    ),
+    "motor at 57 C": HandFault(lambda hand: hand.motors.heat(_FFJ3, 57.0), "stopped: 57 C, limit 55 C", _hot),
     "tendon overloaded": HandFault(
         lambda hand: hand.faults.torque.update({_FFJ3: 3500}),
         "stopped: torque over 3000 counts",

@@ -21,7 +21,8 @@ OUTLINE = Outline(
     f"A session of one grasp on the simulated rig, the box, seed 1, virtual time, cycles of {1000 * CYCLE_s:g} ms. "
     f"Faults of FFJ3, of the motors or of the link from second {STRIKES_AT_s:g} on, while the fingers close. Seen "
     "after: the time that the fault's rule waits (docs/failures.md) and until the polling comes to it. Last demand: "
-    "from the fault until a demand above zero was sent last. Last joint turned: by more than 0.02 rad/s.",
+    "from the fault until the last demand above zero; for the frozen sensor from when its joint is driven, which "
+    "is seconds later. Last joint turned: by more than 0.02 rad/s.",
     ("Fault", "Seen after, at most", "Last demand", "Last joint turned", "The session"),
 )
 

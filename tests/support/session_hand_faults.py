@@ -16,6 +16,8 @@ import numpy as np
 from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import TactileLabError
 from drivers.core.transports import Datagram, Transport
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.device.joint_watch import SensorLimits
 from drivers.shadow.protocol.motor_data import MotorFlag
 from drivers.shadow.protocol.palm_images import PALMS
 from drivers.simulation.devices.motor_bank import MotorBank
@@ -32,6 +34,7 @@ CYCLE_s = 0.01
 
 _FFJ3, _CHANNEL = 1, 2  # the motor of FFJ3 and the channel of its sensor
 _TURNED_rad = 2e-4  # in a cycle: 0.02 rad/s
+_MUST_MOVE = SensorLimits().frozen_share * HandSettings().gains.of("FFJ3").max_pwm  # demand of FFJ3, counts
 
 
 class WatchedHand:
@@ -41,6 +44,7 @@ class WatchedHand:
         palm, motors: the far end.
         fault: begins at :data:`STRIKES_AT_s`.
         driven_ns: when a demand above zero was last sent.
+        eased_ns: when FFJ3 last had a smaller demand than the one at which it has to move.
         turned_ns: when a joint last turned.
         sent: commands since the fault.
     """
@@ -52,7 +56,7 @@ class WatchedHand:
         assert isinstance(motors, MotorBank)
         self.palm, self.motors = palm, motors
         self.begun_ns: int | None = None
-        self.driven_ns = self.turned_ns = self.sent = 0
+        self.driven_ns = self.turned_ns = self.eased_ns = self.sent = 0
         self._before = world.plant.joints_rad
 
     def open(self) -> None:
@@ -78,8 +82,11 @@ class WatchedHand:
             self.fault.inject(self)
         if self.begun_ns is not None:
             self.sent += 1
-            if any(PALMS["0220"].decode_command(payload).motor_data):
+            demands = PALMS["0220"].decode_command(payload).motor_data
+            if any(demands):
                 self.driven_ns = now_ns
+                if abs(demands[_FFJ3]) < _MUST_MOVE:
+                    self.eased_ns = now_ns
             now = self._world.plant.joints_rad
             if np.abs(now - self._before).max() > _TURNED_rad:
                 self.turned_ns = now_ns
@@ -101,12 +108,14 @@ class SessionHandFault:
         rule_s: time that its rule gives it until it can be seen (docs/failures.md), with the time until it is heard.
         told: part of the session's reason; "" if the session goes on.
         gone_s: how long the link is gone.
+        while_driven: it can be seen only while FFJ3 is driven: its rule's time counts from then.
     """
 
     inject: Callable[[WatchedHand], object]
     rule_s: float
     told: str
     gone_s: float = 0.0
+    while_driven: bool = False
 
 
 def _reads(count: int, told: str) -> SessionHandFault:
@@ -125,7 +134,7 @@ def _silent(motors: range) -> SessionHandFault:
 
 def _flag(flag: MotorFlag) -> SessionHandFault:
     def raise_flag(hand: WatchedHand) -> None:
-        hand.motors._flags[_FFJ3] |= int(flag)
+        hand.motors.raise_flags(_FFJ3, int(flag))
 
     return SessionHandFault(raise_flag, 8 * CYCLE_s, "halted")
 
@@ -134,22 +143,25 @@ def _gone(seconds: float, told: str = "") -> SessionHandFault:
     return SessionHandFault(lambda hand: None, 2 * CYCLE_s, told, seconds)
 
 
-def _heat(hand: WatchedHand) -> None:
-    hand.motors._celsius[_FFJ3] = 57.0
-
-
 FAULTS: dict[str, SessionHandFault] = {
     "sensor at 0": _reads(0, "its sensor reads 0 counts"),
     "sensor at 4095": _reads(4095, "its sensor reads 4095 counts"),
     "sensor jumps": SessionHandFault(_jump, CYCLE_s, "jumps by more than a joint can turn"),
-    "sensor frozen": SessionHandFault(lambda hand: hand.palm.faults.frozen.add(_CHANNEL), 0.3, ""),
+    "sensor frozen": SessionHandFault(
+        lambda hand: hand.palm.faults.frozen.add(_CHANNEL),
+        SensorLimits().frozen_s + CYCLE_s,
+        "while driven",
+        while_driven=True,
+    ),
     "one motor silent": _silent(range(1, 2)),
     "ten motors silent": _silent(range(10)),
     "all motors silent": _silent(range(20)),
     "flag: H-bridge": _flag(MotorFlag.BRIDGE_FAULT),
     "flag: stored configuration": _flag(MotorFlag.EEPROM_CRC_BAD),
     "flag: too hot": _flag(MotorFlag.OVER_TEMPERATURE),
-    "motor at 57 C": SessionHandFault(_heat, 1.0 + 8 * CYCLE_s, "57 C, limit 55 C"),
+    "motor at 57 C": SessionHandFault(
+        lambda hand: hand.motors.heat(_FFJ3, 57.0), 1.0 + 8 * CYCLE_s, "57 C, limit 55 C"
+    ),
     "tendon overloaded": SessionHandFault(
         lambda hand: hand.palm.faults.torque.update({_FFJ3: 3500}), 10 * CYCLE_s, "torque over"
     ),
@@ -164,7 +176,8 @@ class SessionHandOutcome:
     """The outcome of a fault in a session.
 
     Attributes:
-        driven_s: from the fault until the last demand above zero; None unless the fault ended the session.
+        driven_s: from the fault (or from when FFJ3 was driven with it) until the last demand above zero; None unless
+            the fault ended the session.
         turned_s: from the fault until the last joint stood still; None unless the fault ended the session.
         ended: why the session ended; "" if it was completed.
     """
@@ -200,5 +213,6 @@ def run_fault(fault: SessionHandFault, root: Path) -> SessionHandOutcome:
     assert hand.begun_ns is not None, "the fault never began"
     if not fault.told or fault.told not in ended:
         return SessionHandOutcome(None, None, ended)
-    after = [max(0, stamp_ns - hand.begun_ns) / NANOSECONDS for stamp_ns in (hand.driven_ns, hand.turned_ns)]
+    begun_ns = max(hand.begun_ns, hand.eased_ns) if fault.while_driven else hand.begun_ns
+    after = [max(0, stamp_ns - begun_ns) / NANOSECONDS for stamp_ns in (hand.driven_ns, hand.turned_ns)]
     return SessionHandOutcome(after[0], after[1], ended)

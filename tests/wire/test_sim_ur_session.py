@@ -13,7 +13,7 @@ from sessions.conductor.session_outcome import Ending
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.rigs.laboratory import WiredLaboratory, open_laboratory
 from tests.support.wire_rig import wire_rig
-from tests.wire.test_sim_wire_session import At, check_ended_in_order, run
+from tests.support.wire_sessions import At, check_ended_in_order, run
 
 pytestmark = [
     pytest.mark.long,

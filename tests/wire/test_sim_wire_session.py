@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +13,8 @@ import pytest
 
 from drivers.core.contacts import Grasp
 from drivers.core.errors import DeviceError
-from drivers.emulators.laboratory.emulated_laboratory import EmulatedLaboratory
-from drivers.shadow.protocol.palm_images import PALMS
 from sessions.conductor.decisions import SessionRoles
-from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
-from sessions.perception.event_outcomes import TareReport
 from sessions.perception.replay import Replay
 from sessions.recording.recorder import Recorder
 from sessions.recording.session import Session
@@ -30,26 +24,13 @@ from tactile_lab.autonomy.estimator_process import EstimatorProcess
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
 from tactile_lab.rigs.laboratory import WiredLaboratory, open_laboratory
-from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow import running
 from tactile_lab.workflow.attending import roles_for
+from tests.support.wire_hand_faults import HAND_FAULTS, run_fault
 from tests.support.wire_rig import wire_rig
+from tests.support.wire_sessions import At, check_ended_in_order, emulated_laboratory, run
 
 pytestmark = pytest.mark.usefixtures("real_time_alone")
-
-
-@dataclass
-class At(NullProgress):
-    """Does something when a phase begins."""
-
-    phase_name: str = ""
-    act: Callable[[], None] = lambda: None
-    told_of: list[str] = field(default_factory=list)
-
-    def phase(self, number: int, name: str) -> None:
-        self.told_of.append(name)
-        if name == self.phase_name:
-            self.act()
 
 
 @pytest.fixture(scope="module")
@@ -70,21 +51,6 @@ def laboratory(rig: Rig) -> Iterator[WiredLaboratory]:
         if "no right" in str(error) or "no permission" in str(error):
             pytest.skip(str(error))
         raise
-
-
-def emulated_laboratory(laboratory: WiredLaboratory) -> EmulatedLaboratory:
-    assert laboratory.emulators is not None
-    return laboratory.emulators
-
-
-def run(
-    rig: Rig, laboratory: WiredLaboratory, root: Path, progress: At, grasps: int = 1
-) -> tuple[SessionOutcome, Path]:
-    """A session as ``tactile-lab run`` makes it, in a laboratory that is running already."""
-    request = running.SessionRequest(rig.source, "box-10x6x4", root, grasps=grasps)
-    slam = TactileSlam(running.slam_settings("joint", 2, rig.description.motion), 0)
-    session = running._new_session(rig, laboratory, slam, request, ())
-    return running._record(session, rig, laboratory, slam, request, progress, running.ALONE), session.folder
 
 
 def run_killing(rig: Rig, laboratory: WiredLaboratory, root: Path, device: str) -> tuple[SessionOutcome, Path]:
@@ -145,6 +111,17 @@ def test_a_world_that_stands_still_ends_the_session_in_order(
     check_ended_in_order(folder, seen)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["sensor frozen", "one motor silent", "motor at 57 C", "link gone for 0.5 s"])
+def test_a_fault_of_the_hand_takes_its_demands_and_is_told_by_name(
+    rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, name: str
+) -> None:
+    """All of them: ``python -m tests.support.wire_hand_fault_table``."""
+    found = run_fault(fault := HAND_FAULTS[name], rig, laboratory, tmp_path)
+    assert fault.told in found.reason
+    assert not found.reason or found.late_cycles <= 2
+
+
 def test_a_hand_process_that_dies_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,22 +160,3 @@ def test_an_estimation_whose_process_dies_ends_the_session_in_order(
     outcome, folder = run(rig, laboratory, tmp_path, At("descend", kill))
     assert outcome.ending is Ending.STOPPED
     check_ended_in_order(folder, "estimation: its process has ended")
-
-
-def check_ended_in_order(folder: Path, words: str) -> None:
-    """A readable recording that says why, with the last cycles, and a hand that was left without demands."""
-    session = Session.open(folder)
-    assert session.manifest.status == "failed"
-    assert words in session.manifest.problem
-    reader = session.traffic()
-    messages = list(reader.messages())
-    assert not reader.loss
-    (stop,) = [json.loads(message.data) for message in messages if message.topic == schemas.SAFETY_TOPIC]
-    assert words in stop["cause"]
-    assert stop["cycles"] or "camera" in words  # a lost connection is noticed before the first cycle has ended
-    sent = [message.data for message in messages if message.topic == schemas.transmitted_topic("hand")]
-    if words != "its process has ended":  # a killed hand process sends nothing more: the motors halt after 20 ms
-        assert not any(PALMS["0220"].decode_command(sent[-1]).motor_data)
-    replay = Replay(session, build_interpreter(rig_of_session(session)))
-    assert all(isinstance(outcome, Grasp | TareReport) for outcome in replay.outcomes())
-    assert not replay.loss

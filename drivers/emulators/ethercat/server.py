@@ -4,9 +4,11 @@ It reads its settings, and later orders, as lines of JSON on standard input, and
 when standard input ends, so it never outlives the program that started it.
 
 Orders: ``{"cable": {...}}`` sets fields of :class:`~drivers.emulators.ethercat.ring.CableFaults`; ``{"hung": true}``
-stops the palm's processor; ``{"service_ns": n}`` slows it; ``{"silent": [motors]}``; ``{"fall": [state, code]}`` lets
-the palm leave its state; ``{"power_cycle": true}``; ``{"announce": [bus, identifier, hex]}`` lets a motor send a frame
-on its CAN bus. Every answer contains the counts.
+stops the palm's processor; ``{"service_ns": n}`` slows it; ``{"silent": [motors]}``, ``{"frozen": [channels]}``,
+``{"stuck": [[channel, counts], ...]}`` and ``{"torque": [[motor, counts], ...]}`` set fields of
+:class:`~drivers.simulation.devices.palm_emulator.PalmFaults`; ``{"flags": [motor, bits]}`` and ``{"heat": [motor,
+celsius]}`` happen to a motor; ``{"fall": [state, code]}`` lets the palm leave its state; ``{"power_cycle": true}``;
+``{"announce": [bus, identifier, hex]}`` lets a motor send a frame on its CAN bus. Every answer contains the counts.
 """
 
 from __future__ import annotations
@@ -98,7 +100,7 @@ class HandServer:
             setattr(hand.ring.faults, name, value)
         hand.palm.hung = order.get("hung", hand.palm.hung)
         hand.palm.service_ns = order.get("service_ns", hand.palm.service_ns)
-        hand.palm.palm.faults.silent = set(order.get("silent", hand.palm.palm.faults.silent))
+        self._spoil(order)
         if "fall" in order:
             state, code = order["fall"]
             hand.palm_slave.fall_to(AlState(state), code)
@@ -110,6 +112,18 @@ class HandServer:
             payload = bytes.fromhex(data)
             self._can.announce(CanFrame(bus, len(payload), identifier, payload.ljust(8, b"\0")))
         return self._counts()
+
+    def _spoil(self, order: dict[str, Any]) -> None:
+        """Obey what an order says of sensors and motors."""
+        palm, motors = self._hand.palm.palm, self._hand.palm.motors
+        for name in ("silent", "frozen"):
+            setattr(palm.faults, name, set(order.get(name, getattr(palm.faults, name))))
+        for name in ("stuck", "torque"):
+            setattr(palm.faults, name, dict(order.get(name, getattr(palm.faults, name))))
+        if "flags" in order:
+            motors.raise_flags(*order["flags"])
+        if "heat" in order:
+            motors.heat(*order["heat"])
 
     def _counts(self) -> dict[str, Any]:
         hand = self._hand

@@ -42,12 +42,16 @@ class PalmApplication:
         image: which palm it is.
         clock: for the motors.
         service_ns: from a command's arrival to its status.
+
+    Attributes:
+        hung: whether the processor hangs.
+        served: cycles that it has served.
     """
 
     def __init__(
         self, palm: PalmEmulator, motors: MotorBank, image: PalmImage, clock: Clock, service_ns: int = _SERVICE_ns
     ) -> None:
-        self.palm, self._motors, self._image, self._clock = palm, motors, image, clock
+        self.palm, self.motors, self._image, self._clock = palm, motors, image, clock
         self.sync_managers: tuple[SyncManager, ...] = image.sync_managers()
         self.service_ns = service_ns
         self.hung = False
@@ -72,9 +76,9 @@ class PalmApplication:
         return status[:-CAN_BYTES], status[-CAN_BYTES:]
 
     def _halt_late_motors(self) -> None:
-        due_ns = self._motors.next_event_ns
+        due_ns = self.motors.next_event_ns
         if due_ns is not None and self._clock.now_ns() >= due_ns:
-            self._motors.tick()
+            self.motors.tick()
 
 
 @dataclass(frozen=True)

@@ -271,7 +271,7 @@ class ShadowHand:
             return NO_DEMAND
         share = self._guard.pwm_share(last.motor.temperature_C)
         words = self._motion.words(last.joints_rad, share, now_ns)
-        self._guard.look_at_demand(words, last, now_ns)
+        self._guard.look_at_demand(words, last, now_ns, is_nudge=self._motion.is_nudge)
         return words if self._guard.fault is None else NO_DEMAND
 
     # --- state for people --------------------------------------------------------------------------------------

@@ -126,13 +126,15 @@ class HandGuard:
             what = f"stopped: the program stood still for {self._silent_s(now_ns):.1f} s"
             self.blame(Fault(what, self._where, "Find out what held the computer up, then resume"))
 
-    def look_at_demand(self, words: NDArray[np.int16], last: HandSample, now_ns: int) -> None:
+    def look_at_demand(self, words: NDArray[np.int16], last: HandSample, now_ns: int, *, is_nudge: bool) -> None:
         """Look at the demands that are to go out, shape (20,), before they do, with the sample that they rest on.
 
-        A motor told its most for too long has stalled; one that pushes against nothing has to move its joint.
+        A motor told its most for too long has stalled; one that pushes against nothing has to move its joint. A nudge
+        need not: whoever nudges looks at what moves, and small duty cycles may not overcome friction.
         """
         self.blame(self._load.stall(words, last.joints_rad, now_ns))
-        self.blame(self._joints.frozen(words, last.motor.torque, now_ns))
+        if not is_nudge:
+            self.blame(self._joints.frozen(words, last.motor.torque, now_ns))
 
     def pwm_share(self, temperature_C: Array) -> Array:
         """Share of the duty cycle each motor may have, shape (20,)."""

@@ -48,6 +48,11 @@ class HandMotion:
         return self._nudge is not None or self._control.active
 
     @property
+    def is_nudge(self) -> bool:
+        """Whether a single motor is nudged."""
+        return self._nudge is not None
+
+    @property
     def driven(self) -> NDArray[np.bool_]:
         """Motors that are to be driven, shape (20,)."""
         return self._control.driven if self._nudge is None else self._nudge != 0

@@ -32,7 +32,8 @@ class SensorLimits(StrictModel):
         margin: how far beyond its calibrated counts a joint may read, as a share of their span.
         rate_rad_s: quicker than this no joint turns, even when it is let go.
         jump_rad: a step of this size between two readings is noise.
-        frozen_s: a driven joint that reads the very same for so long stands still, or its sensor does.
+        frozen_s: a driven joint that reads the very same for so long stands still, or its sensor does. At its largest
+            demand a finger turns by 10 to 15 degrees in the default time.
         frozen_share: driven with this share of its largest demand at least.
         idle_torque_counts: with a smaller strain-gauge difference the motor pushes against nothing, so that a driven
             joint has to move.
@@ -41,7 +42,7 @@ class SensorLimits(StrictModel):
     margin: float = Field(default=0.3, ge=0.0)
     rate_rad_s: float = Field(default=30.0, gt=0.0)
     jump_rad: float = Field(default=0.1, ge=0.0)
-    frozen_s: float = Field(default=0.3, gt=0.0)
+    frozen_s: float = Field(default=0.1, gt=0.0)
     frozen_share: float = Field(default=0.3, gt=0.0, le=1.0)
     idle_torque_counts: float = Field(default=100.0, ge=0.0)
 

@@ -87,6 +87,14 @@ class MotorBank:
         self._flags |= _NO_DEMAND
         self._turn(np.zeros(MOTORS))
 
+    def raise_flags(self, motor: int, flags: int) -> None:
+        """Let a motor report flags (:class:`~drivers.shadow.protocol.motor_data.MotorFlag`) until it is reset."""
+        self._flags[motor] |= flags
+
+    def heat(self, motor: int, celsius: float) -> None:
+        """Set the temperature of a motor's winding, degrees Celsius."""
+        self._celsius[motor] = celsius
+
     def take(self, command: PalmCommand) -> None:
         """Pass a command's words on to the motors."""
         words = np.array(command.motor_data, int)

@@ -36,7 +36,7 @@ class Rig:
     def __init__(self, believed: MotorMap = TRUE_MAP, boards: Any = None, **settings: Any) -> None:
         self.clock = VirtualClock()
         self.emulated = emulated_hand(self.clock, CALIBRATION)
-        self.bank = self.emulated.palm._motors
+        self.bank = self.emulated.palm.motors
         transport = EthercatTransport(
             "hand", EthercatSettings(interface="m"), self.clock, MemoryPort(self.emulated.ring)
         )

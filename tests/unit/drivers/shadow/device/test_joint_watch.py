@@ -114,7 +114,7 @@ def test_a_joint_that_is_driven_against_nothing_has_to_move(pwm: int, torque: fl
     told = [fault for fault in faults if fault is not None]
     assert bool(told) == stops
     if told:
-        assert faults.index(told[0]) == pytest.approx(300, abs=2)
+        assert faults.index(told[0]) == pytest.approx(100, abs=2)
         assert told[0].where == "hand, FFJ1 (motor 0)"
 
 
