@@ -15,7 +15,6 @@ _LEAST_SLIDING = 40
 """Sliding contacts that are needed to tell their friction: 0.8 s of one fingertip."""
 _SLIDING_SHARE = 0.9
 """Quantile of the force ratios at contacts that slide: some only seem to, and lie below the cone."""
-_TIP_FRICTION_SIGMA = 0.05
 
 
 @dataclass(frozen=True)
@@ -71,13 +70,14 @@ class ObjectProperties:
             ("mass", self.mass_kg, 1e3, "g", 0),
             ("table's friction", self.table_friction_N, 1.0, "N", 2),
             ("coefficient of the table", self.table_friction, 1.0, "", 2),
-            ("of the fingertips", self.tip_friction, 1.0, "", 2),
         ]
         told = [
             f"{name} {scale * each.value:.{digits}f} ± {2 * scale * each.sigma:.{digits}f} {unit}".rstrip()
             for name, each, scale, unit, digits in values
             if each is not None
         ]
+        if self.tip_friction_at_least is not None:
+            told.append(f"of the fingertips at least {self.tip_friction_at_least:.2f}")
         return ", ".join(told) or "nothing is known of its weight and friction"
 
     @property
@@ -110,12 +110,13 @@ class ObjectProperties:
         return _mean(found)
 
     @property
-    def tip_friction(self) -> Value | None:
-        """Coefficient of friction of the fingertips on the object; None if they hardly slid."""
+    def tip_friction_at_least(self) -> float | None:
+        """What the fingertips' coefficient of friction is at least; None if they hardly slid.
+
+        A light object, or one that the hand carries along, does not reach the edge of the cone.
+        """
         ratios = np.concatenate([np.zeros(0), *(each for _, each in self.sliding)])
-        if len(ratios) < _LEAST_SLIDING:
-            return None
-        return Value(float(np.quantile(ratios, _SLIDING_SHARE)), _TIP_FRICTION_SIGMA)
+        return float(np.quantile(ratios, _SLIDING_SHARE)) if len(ratios) >= _LEAST_SLIDING else None
 
     @property
     def _free(self) -> list[tuple[int, Hanging]]:

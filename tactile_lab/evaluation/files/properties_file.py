@@ -38,7 +38,7 @@ def write_properties(folder: Path, properties: ObjectProperties, world_T_object:
         "centre_of_mass_m": _centre(properties, world_T_object),
         "table_friction_N": properties.table_friction_N,
         "table_friction": properties.table_friction,
-        "tip_friction": properties.tip_friction,
+        "tip_friction_at_least": properties.tip_friction_at_least,
         "times_weighed": len(properties.hangings),
         "times_weighed_free": len(properties.centres),
     }
