@@ -18,6 +18,8 @@ from drivers.core.extensions import blamed
 from tactile_lab.cli.interruptions import INTERRUPTED, interruptions_heeded, nothing_begun
 from tactile_lab.cli.streams import open_missing_streams
 
+_WORDS_OF_NO_MEMORY = ("can't start new thread", "ould not allocate memory", "Insufficient memory")
+"""Of Python, MuJoCo and OpenCV, whose errors have no type for it."""
 _NO_MEMORY = "the memory is exhausted. Close other programs, or raise the limit (ulimit -v)"
 
 # Sums of several BLAS threads come out in another order, and a replay must give the same bytes on any machine.
@@ -26,6 +28,7 @@ os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
 os.environ.setdefault(
     "OPENCV_IO_MAX_IMAGE_PIXELS", "100000000"
 )  # a packed picture of 100 kB may claim a thousand million
+os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # its warnings speak of its own source lines
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -90,7 +93,7 @@ def _run(app: Callable[..., None], arguments: Sequence[str] | None) -> None:
 def _lacks_memory(error: Exception) -> bool:
     """Whether the system refused memory by another error than MemoryError: for a thread's stack, or a library."""
     refused = isinstance(error, OSError) and error.errno == errno.ENOMEM
-    return refused or (isinstance(error, RuntimeError) and "can't start new thread" in str(error))
+    return refused or any(words in str(error) for words in _WORDS_OF_NO_MEMORY)
 
 
 def _unusable_path(error: Exception) -> str:

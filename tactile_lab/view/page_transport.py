@@ -31,7 +31,7 @@ class PageTransport(ProcessFeed):
         certificate: str = "",
     ) -> None:
         door = {"address": address, "port": port, "token": token, "certificate": certificate}
-        hint = "Or run without --view"
+        hint = "Try again, or run without --view"
         settings = {"panel": panel, "title": title, **door}
         super().__init__("tactile_lab.view.process", settings, name="page", hint=hint)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import tempfile
 import traceback
@@ -49,6 +50,8 @@ def _become(words: Sequence[str], folder: Path, streams: tuple[int, int, int], p
     code = FAILED
     try:
         os.setsid()
+        for ignored in (signal.SIGINT, signal.SIGHUP):  # in what a background shell or nohup starts
+            signal.signal(ignored, signal.SIG_DFL if ignored == signal.SIGHUP else signal.default_int_handler)
         if os.isatty(streams[0]):
             os.close(os.open(os.ttyname(streams[0]), os.O_RDWR))  # the first that a leader opens becomes its own
         for number, descriptor in enumerate(streams):

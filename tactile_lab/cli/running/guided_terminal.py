@@ -155,5 +155,6 @@ class LineTerminal:
 
 def terminal_for(pedal: str = "") -> KeyTerminal | LineTerminal:
     """The display that standard input and output allow. Raises ConfigurationError as :class:`KeyTerminal` does."""
+    pedal_key(pedal)  # a key that there is not is told on any input
     able = sys.stdin.isatty() and people.is_terminal and not people.is_dumb_terminal
     return KeyTerminal(pedal) if able else LineTerminal()

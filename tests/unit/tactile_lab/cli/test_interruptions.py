@@ -192,9 +192,12 @@ def test_a_hangup_that_is_ignored_stays_ignored() -> None:
         signal.signal(signal.SIGHUP, before)
 
 
-def test_exhausted_memory_is_told_in_words(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("error", [MemoryError(), RuntimeError("Could not allocate memory")])
+def test_exhausted_memory_is_told_in_words(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: Exception
+) -> None:
     def exhausted(*arguments: object, **named: object) -> None:
-        raise MemoryError
+        raise error
 
     monkeypatch.setattr("tactile_lab.cli.app.app", exhausted)
     with pytest.raises(SystemExit) as ended:
