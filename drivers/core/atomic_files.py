@@ -50,6 +50,13 @@ def refuse_existing(targets: Sequence[Path]) -> None:
             raise ConfigurationError("exists already", where=str(target), hint="Choose another name, or remove it")
 
 
+def refuse_unwritable(target: Path) -> None:
+    """Before hours of work: a file that could not be written at their end. Raises ConfigurationError."""
+    folder = next(parent for parent in target.absolute().parents if parent.exists())
+    if target.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise ConfigurationError("cannot be written", where=str(target), hint="Choose another file")
+
+
 @contextmanager
 def writing_into(folder: Path) -> Iterator[None]:
     """Within the block files of a folder are written or copied. Raises WriteError, in words, where one cannot be."""

@@ -116,11 +116,13 @@ Merge = Annotated[
 
 
 def _check_parquet(path: Path | None) -> Path | None:
-    """A package that is missing is named before hours of runs, not after them."""
+    """A package that is missing, and a file that cannot be written, are named before hours of runs, not after them."""
     if path is not None:
+        from drivers.core.atomic_files import refuse_unwritable
         from drivers.core.installed.extras import require_package
 
         require_package("pyarrow")
+        refuse_unwritable(path)
     return path
 
 

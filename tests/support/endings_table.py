@@ -9,6 +9,7 @@ the wall clock jumps for the session only. What a jump of the session's own cloc
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
 import re
@@ -38,7 +39,7 @@ from tests.support.stored_table import GrowingTable, Outline, parser
 from tests.support.warm_program import load
 
 _SLOW_bytes_per_s, _ROOM_bytes, _STALL_s = 100_000, 500_000, 15.0
-_NOBODY, _SHOWN = 65534, 150
+_CAPABILITIES_VERSION, _SHOWN = 0x20080522, 150
 _POLL_s = 0.02
 
 OUTLINE = Outline(
@@ -159,9 +160,10 @@ def _make_read_only(running: Running) -> None:
         item.chmod(0o555 if item.is_dir() else 0o444)
 
 
-def _as_nobody() -> None:
-    os.setgid(_NOBODY)
-    os.setuid(_NOBODY)
+def _without_privileges() -> None:
+    """As any user: permissions of files hold for root, too."""
+    header, none = (ctypes.c_uint32 * 2)(_CAPABILITIES_VERSION, 0), (ctypes.c_uint32 * 6)()
+    assert ctypes.CDLL(None).capset(header, none) == 0
 
 
 def _little_memory() -> None:
@@ -245,7 +247,7 @@ ENDINGS: dict[str, Ending] = {
     "memory limited (ulimit -v)": Ending(prepare=_little_memory),
     "its folder removed": Ending(lambda running: shutil.rmtree(running.session)),
     "its folder renamed": Ending(_rename),
-    "its folder made read-only": Ending(_make_read_only, prepare=_as_nobody),
+    "its folder made read-only": Ending(_make_read_only, prepare=_without_privileges),
     "another session in the same folder": Ending(_beside_another),
     "the wall clock set back by an hour": Ending(prepare=_clock_jumps(timedelta(hours=-1))),
     "the wall clock set forward by an hour": Ending(prepare=_clock_jumps(timedelta(hours=1))),
@@ -263,9 +265,7 @@ def run(ending: Ending) -> tuple[str, ...]:
     """Run a session into an ending; the cells of its row."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        folder.chmod(0o777)
-        (folder / "runs").mkdir(mode=0o777)
-        (folder / "runs").chmod(0o777)
+        (folder / "runs").mkdir()
         if ending.disk:
             subprocess.run(["mount", "-t", "tmpfs", "-o", ending.disk, "tmpfs", str(folder / "runs")], check=True)
             stack.callback(subprocess.run, ["umount", "-l", str(folder / "runs")], check=True)

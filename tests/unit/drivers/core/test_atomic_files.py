@@ -7,8 +7,8 @@ import os
 
 import pytest
 
-from drivers.core.atomic_files import write_whole
-from drivers.core.errors import WriteError
+from drivers.core.atomic_files import refuse_unwritable, write_whole
+from drivers.core.errors import ConfigurationError, WriteError
 
 
 @pytest.fixture
@@ -61,3 +61,12 @@ def test_a_folder_one_may_not_write_to_is_named_with_what_to_do(old, monkeypatch
 def test_a_file_in_the_place_of_a_folder_is_told(old):
     with pytest.raises(WriteError, match=r"inside: cannot be written \(.*record.yaml is not a folder\)\. Use --out"):
         write_whole(old / "inside", "new", "Use --out")
+
+
+def test_a_file_that_could_not_be_written_later_is_refused_now(tmp_path):
+    (tmp_path / "file").touch()
+    for target in (tmp_path, tmp_path / "file" / "table.parquet"):
+        with pytest.raises(ConfigurationError, match="cannot be written"):
+            refuse_unwritable(target)
+    refuse_unwritable(tmp_path / "file")
+    refuse_unwritable(tmp_path / "new" / "table.parquet")
