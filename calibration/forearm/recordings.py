@@ -194,7 +194,7 @@ def _json(path: Path) -> Any:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
         ) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ConfigurationError("is not JSON", where=str(path), hint="Check the file") from error
 
 

@@ -129,7 +129,7 @@ def _load_json(path: Path) -> Any:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
         ) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ConfigurationError(f"is not JSON ({error})", where=str(path)) from error
 
 

@@ -79,7 +79,7 @@ def read_json(path: Path) -> dict[str, Any]:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
         ) from error
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ConfigurationError(f"is not JSON ({error})", where=str(path)) from error
     form = document.get("format") if isinstance(document, dict) else None
     if form == "tactile-contacts/1":

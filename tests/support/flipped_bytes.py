@@ -137,13 +137,15 @@ def main() -> None:
     parser.add_argument("--places", type=int, default=2000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--recording", type=Path)
+    parser.add_argument("--chunk", type=int, help="of the recording, instead of the first and the middle one")
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
     with tempfile.TemporaryDirectory() as folder:
         if asked.recording is not None:
             made = read_recording(asked.recording)
-            for number in (0, len(made.spans) // 2):
-                places = random.integers(*made.spans[number], asked.places // 2)
+            chunks = (0, len(made.spans) // 2) if asked.chunk is None else (asked.chunk,)
+            for number in chunks:
+                places = random.integers(*made.spans[number], asked.places // len(chunks))
                 _tell(f"chunk {number} of a session", made, places, random, Path(folder))
             return
         for whole in (True, False):

@@ -70,7 +70,11 @@ def read_json_object(path: Path, *, hint: str) -> dict[str, Any]:
         content = parse_json(read_bounded(path, LARGEST_JSON_bytes))
     except FileNotFoundError as error:
         raise SessionDataError("file not found", where=str(path), hint=hint) from error
-    except (OSError, ConfigurationError, ValueError, RecursionError) as error:
+    except OSError as error:
+        raise SessionDataError(f"cannot be read ({error.strerror})", where=str(path), hint=hint) from error
+    except ConfigurationError as error:
+        raise SessionDataError(error.what, where=str(path), hint=hint) from error
+    except ValueError as error:
         raise SessionDataError(f"is not readable JSON ({error})", where=str(path), hint=hint) from error
     if not isinstance(content, dict):
         raise SessionDataError("does not contain a JSON object", where=str(path), hint=hint)

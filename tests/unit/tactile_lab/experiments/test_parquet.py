@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pyarrow import parquet
 
-from drivers.core.errors import SessionError, WriteError
+from drivers.core.errors import WriteError
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.execution.source_version import version
 from tactile_lab.experiments.parquet import write_parquet
@@ -61,10 +61,10 @@ def test_runs_of_another_machine_are_taken_over(tmp_path: Path) -> None:
 
 def test_runs_of_another_machine_have_to_be_of_this_version(tmp_path: Path) -> None:
     there, cells = tmp_path / "there.jsonl", [Cell((("noise", 25),), 1)]
-    with pytest.raises(SessionError, match="no results here"):
+    with pytest.raises(ConfigurationError, match="no results here"):
         run_cells("test", cells, cluster_work.square, tmp_path / "here.jsonl", RunnerSettings(others=(there,)))
     run_cells("test", cells, cluster_work.square, there)
     head, *lines = there.read_text().splitlines()
     there.write_text("\n".join([json.dumps({**json.loads(head), "version": "older"}), *lines]) + "\n")
-    with pytest.raises(SessionError, match="made by another version"):
+    with pytest.raises(ConfigurationError, match="made by another version"):
         run_cells("test", cells, cluster_work.square, tmp_path / "here.jsonl", RunnerSettings(others=(there,)))

@@ -9,7 +9,7 @@ from pathlib import Path
 import grimp
 import pytest
 
-from drivers.core.errors import SessionError, TrackingError, WriteError
+from drivers.core.errors import TrackingError, WriteError
 from tactile_lab.experiments import runner
 from tactile_lab.experiments.cells import Cell, Row, execute, grid, planned_cells
 from tactile_lab.experiments.execution import source_version
@@ -153,10 +153,10 @@ def test_version_changes_with_any_source(tmp_path: Path, monkeypatch: pytest.Mon
 def test_a_file_of_something_else_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "runs.jsonl"
     run_cells("test", CELLS[:1], square, file)
-    with pytest.raises(SessionError, match="results of test"):
+    with pytest.raises(ConfigurationError, match="results of test"):
         run_cells("other", CELLS[:1], square, file)
     file.write_text("hello\n")
-    with pytest.raises(SessionError, match="not a results file"):
+    with pytest.raises(ConfigurationError, match="not a results file"):
         run_cells("test", CELLS[:1], square, file)
     (tmp_path / "plain").write_text("")
     with pytest.raises(WriteError, match="cannot be written"):

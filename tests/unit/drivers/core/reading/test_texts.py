@@ -38,3 +38,17 @@ def test_json_of_very_many_lists_is_refused_before_it_is_read(monkeypatch):
     assert json_text.parse_json(b'{"a": [[]]}') == {"a": [[]]}
     with pytest.raises(ValueError, match="more than 3 lists and objects"):
         json_text.parse_json(b'{"a": [[], []')
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"\xf5", "not text in UTF-8"),
+        (b'{"a":\n 1,}', "a mistake in line 2, column 4"),
+        (b"[" * 50_000, "nested too deeply"),
+        (b"9" * 5000, "a number of more than 4300 digits"),
+    ],
+)
+def test_what_is_no_json_is_told_without_the_words_of_a_library(content, words):
+    with pytest.raises(ValueError, match=f"^{words}$"):
+        json_text.parse_json(content)
