@@ -12,7 +12,8 @@ _PARTS = ("tactile_lab", "calibration", "drivers", "sessions")
 _WITHOUT = ("cli", "workflow", "view", "report", "experiments/results", *(f"experiments/{name}.py" for name in _PLOTS))
 """Parts of tactile_lab that only present results or read commands, except for these modules:"""
 _WORKFLOW = (
-    "attending", "calibrating_forearm", "exporters", "exporting", "finishing", "plugging", "replaying", "running"
+    "attending", "calibrating_forearm", "exporters", "exporting", "finishing", "object_check", "plugging", "replaying",
+    "running",
 )  # fmt: skip
 _WITH = tuple(f"workflow/{name}.py" for name in _WORKFLOW)
 

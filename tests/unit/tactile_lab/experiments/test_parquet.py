@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pyarrow import parquet
 
-from drivers.core.errors import WriteError
+from drivers.core.errors import ConfigurationError, WriteError
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.execution.source_version import version
 from tactile_lab.experiments.parquet import write_parquet

@@ -9,7 +9,7 @@ from pathlib import Path
 import grimp
 import pytest
 
-from drivers.core.errors import TrackingError, WriteError
+from drivers.core.errors import ConfigurationError, TrackingError, WriteError
 from tactile_lab.experiments import runner
 from tactile_lab.experiments.cells import Cell, Row, execute, grid, planned_cells
 from tactile_lab.experiments.execution import source_version
