@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -92,6 +93,19 @@ def test_what_is_written_is_read_back(tmp_path):
         assert one.hand_motion_world.equals(other.hand_motion_world, 1e-15)
     assert found.truth == written.truth
     assert found.true_poses[0].equals(motion, 1e-15)
+
+
+def test_what_the_contacts_of_a_finger_share_is_read_back(tmp_path):
+    shared = np.diag([4e-7, 1e-7, 2e-7])
+    touches = (
+        replace(contact("FF", [0.01, 0.02, 0.03], [1, 0, 0]), shared_covariance_m2=shared),
+        contact("TH", [0.0, 0.02, 0.03], [-1, 0, 0]),
+    )
+    for dimension, expected in ((3, shared), (2, np.diag([4e-7, 1e-7, 0.0]))):
+        write_contact_log(tmp_path / f"{dimension}.json", log(dimension, [Grasp(0, 0, touches, Pose3())]))
+        first, second = read_contact_log(tmp_path / f"{dimension}.json").grasps[0].contacts
+        np.testing.assert_array_equal(first.shared_covariance_m2, expected)
+        assert second.shared_covariance_m2 is None
 
 
 def test_a_planar_log_keeps_the_horizontal_part(tmp_path):

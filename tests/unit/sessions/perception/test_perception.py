@@ -104,6 +104,8 @@ def test_point_covariance_contains_the_joint_angles_through_the_jacobian():
         rotation = geometry.world_T_distal[index, :3, :3]
         expected = np.cov(points[:, index].T) + rotation @ TIP.point_covariance_m2 @ rotation.T
         np.testing.assert_allclose(contact.point_covariance_m2, expected, atol=0.05 * np.trace(expected))
+        shared = np.cov(points[:, index].T)  # offsets of the joints: the same for all contacts of the finger
+        np.testing.assert_allclose(contact.shared_covariance_m2, shared, atol=0.05 * np.trace(shared))
         tilt = np.trace(np.cov(normals[:, index].T)) / 2
         assert contact.normal_sigma_rad == pytest.approx(np.sqrt(TIP.normal_sigma_rad**2 + tilt), rel=0.05)
 
