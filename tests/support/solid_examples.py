@@ -35,6 +35,20 @@ def cylinder_mesh() -> trimesh.Trimesh:
     return _on_table(trimesh.creation.cylinder(radius=0.035, height=0.09, sections=96))
 
 
+def cushion_mesh() -> trimesh.Trimesh:
+    """A carton of 60 x 45 x 140 mm, standing, with round edges and sides that bulge by up to 4 mm."""
+    angles = np.linspace(0.0, 2 * np.pi, 48, endpoint=False)
+    reach = (np.abs(np.cos(angles)) ** 5 + np.abs(np.sin(angles)) ** 5) ** (-1 / 5)
+    outline = reach[:, None] * np.column_stack([0.030 * np.cos(angles), 0.0225 * np.sin(angles)])
+    heights = np.linspace(0.0, 0.14, 12)
+    sizes = 1 - 0.15 * (heights / 0.07 - 1) ** 2
+    corners = [
+        np.column_stack([size * outline, np.full(48, height)]) for size, height in zip(sizes, heights, strict=True)
+    ]
+    hull: trimesh.Trimesh = trimesh.convex.convex_hull(np.vstack(corners))
+    return _on_table(hull)
+
+
 def contacts_on(mesh: trimesh.Trimesh, count: int, seed: int, *, noise: bool = True) -> tuple[Array, Array]:
     """Contacts spread by area over all but the underside."""
     points, normals = sample_mesh_with_normals(mesh, 4 * count, seed)

@@ -78,6 +78,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "prism": _shape("prism"),
         "turned": _shape("turned"),
         "standing field": _shape("standing field"),
+        "sections": _shape("sections"),
         "strays": _shape("strays"),
         "pose uncertainty": _joint("pose uncertainty"),
         "fixed lag": {"joint": {"window": 1000}},
@@ -85,7 +86,16 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 )
 """Settings that switch a mechanism off, by its name."""
 
-_IN_SPACE_ONLY = ("polyhedron", "prism", "turned", "standing field", "strays", "held-out contacts", "pose uncertainty")
+_IN_SPACE_ONLY = (
+    "polyhedron",
+    "prism",
+    "turned",
+    "standing field",
+    "sections",
+    "strays",
+    "held-out contacts",
+    "pose uncertainty",
+)
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
 _LONG_TOO = (NOTHING, "fixed lag")

@@ -57,8 +57,8 @@ def _everyday_things(grasps: int) -> list[Setting]:
 
 def _everyday_shapes(grasps: int) -> list[Setting]:
     scans = () if _everyday_scans_left_out() else EVERYDAY_SCANS
-    left_out = (everyday_shape.NOTHING, "turned")
-    return grid(shape=(*HOUSEHOLD, *FURTHER_SHAPES, *scans), without=left_out, grasps=[grasps])
+    left_out, counts = (everyday_shape.NOTHING, "turned", "sections"), sorted({grasps, grasps * 3 // 2})
+    return grid(shape=(*HOUSEHOLD, *FURTHER_SHAPES, *scans), without=left_out, grasps=counts)
 
 
 def _known_on_table(grasps: int) -> list[Setting]:
@@ -127,7 +127,7 @@ EVERYDAY = Experiment(
 EVERYDAY_SHAPE = Experiment(
     "everyday-shape",
     "Shapes of everyday things on a table from grasps at all heights and known poses, with and without solids of "
-    "revolution.",
+    "revolution and sections along edges.",
     _everyday_shapes,
     everyday_shape.shape_at_known_poses,
     (

@@ -123,16 +123,20 @@ class Gpis:
         check_contacts(points_m, normals, point_sigma, normal_sigma)
         observations = observe(points_m, normals, point_sigma, normal_sigma, self.settings)
         factor = self._extended_factor(observations) if self.settings.observations == "normals" else None
-        return type(self)(
-            points_m, normals, self.settings, observations, self.kernel, self.prior, self.noise_scale, factor
-        )
+        return self._again(points_m, normals, observations, self.kernel, self.prior, self.noise_scale, factor)
 
     def of_some(self, kept: NDArray[np.intp]) -> Self:
         """The field of a subset of contacts, given by indices, with the same kernel; normals are observed."""
         seen = self.observations
         sigmas = seen.value_sigma_m[kept], seen.gradient_sigma[kept]
-        fewer = type(self).fit(self.contacts_m[kept], self.normals[kept], *sigmas, self.settings)
-        return fewer.with_log_parameters(self.kernel.log_parameters)
+        return self.refit(self.contacts_m[kept], self.normals[kept], *sigmas)
+
+    def refit(self, points_m: Array, normals: Array, point_sigma_m: Array, normal_sigma_rad: Array) -> Self:
+        """The field of other contacts with the same kernel; arguments and errors as of :meth:`fit`."""
+        check_contacts(points_m, normals, point_sigma_m, normal_sigma_rad)
+        observations = observe(points_m, normals, point_sigma_m, normal_sigma_rad, self.settings)
+        prior = prior_mean(points_m, normals, self.settings)
+        return self._again(points_m, normals, observations, self.kernel, prior)
 
     def optimise(
         self, *, noise: bool = False, max_iterations: int = 30, longest_m: float = _LENGTH_BOUNDS_m[1]
@@ -144,7 +148,7 @@ class Gpis:
         length stays below ``longest_m``.
         """
         bounds = np.log(self._bounds(noise, longest_m))
-        start = np.append(self.kernel.log_parameters, np.log(self.noise_scale))[: len(bounds)]
+        start = np.append(self.log_parameters, np.log(self.noise_scale))[: len(bounds)]
 
         def objective(log_parameters: Array) -> tuple[float, Array]:
             candidate = self.with_log_parameters(log_parameters)
@@ -160,14 +164,30 @@ class Gpis:
         )
         return self.with_log_parameters(found.x)
 
+    @property
+    def log_parameters(self) -> Array:
+        """Logarithms of the kernel's parameters that may be optimised."""
+        return self.kernel.log_parameters
+
     def with_log_parameters(self, log_parameters: Array) -> Self:
         """The same contacts with other kernel parameters and, if one more is given, another noise scale."""
         count = len(self.kernel.log_parameters)
         kernel = self.kernel.with_log_parameters(log_parameters[:count])
         noise_scale = float(np.exp(log_parameters[count])) if len(log_parameters) > count else self.noise_scale
-        return type(self)(
-            self.contacts_m, self.normals, self.settings, self.observations, kernel, self.prior, noise_scale
-        )
+        return self._again(self.contacts_m, self.normals, self.observations, kernel, self.prior, noise_scale)
+
+    def _again(
+        self,
+        contacts_m: Array,
+        normals: Array,
+        observations: Observations,
+        kernel: Kernel,
+        prior: PriorMean,
+        noise_scale: float = 1.0,
+        factor: RowFactor | None = None,
+    ) -> Self:
+        """A field of the same kind and settings."""
+        return type(self)(contacts_m, normals, self.settings, observations, kernel, prior, noise_scale, factor)
 
     def log_marginal_likelihood(self) -> float:
         """``log p(observations | parameters)``.
@@ -181,7 +201,7 @@ class Gpis:
     def log_marginal_likelihood_gradient(self) -> Array:
         """Its derivatives by the kernel's ``log_parameters`` and, last, by ``log(noise_scale)``."""
         outer = np.outer(self._weights, self._weights) - self._factor.inverse()
-        by_kernel = log_parameter_traces(self.kernel, self.observations.points_m, self._gradient_count, outer)
+        by_kernel = self._kernel_traces(outer)
         by_noise = 2 * self.noise_scale**2 * (np.diag(outer) @ self.observations.noise_variance)
         return 0.5 * np.append(by_kernel, by_noise)
 
@@ -234,16 +254,15 @@ class Gpis:
         """
         points_m = np.asarray(points_m, dtype=float)
         noise = self.noise_scale**2 * self.observations.value_sigma_m.min() ** 2
-        fits = self.kernel.amplitude < _SINGLE_PRECISION_RATIO * noise
+        fits = self._prior_variance < _SINGLE_PRECISION_RATIO * noise
         single = self._factor.in_single_precision() if rough and fits else None
         return np.concatenate([self._variance(points_m[block], single) for block in self._blocks(len(points_m))])
 
     def joint_covariance(self, points_m: Array) -> Array:
         """Posterior covariance of the values at points of shape (q, d) with each other, shape (q, q), square metres."""
         points_m = np.asarray(points_m, dtype=float)
-        rows = cross_covariance(self.kernel, points_m, self.observations.points_m, self._gradient_count)
         prior = self.kernel.profile(cdist(points_m, points_m, "sqeuclidean")).value
-        return np.asarray(prior - self._factor.explained_covariance(rows))
+        return np.asarray(prior - self._factor.explained_covariance(self._cross_covariance(points_m)))
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """The field at points of shape (q, d), in blocks, so that memory stays bounded for any q.
@@ -271,8 +290,7 @@ class Gpis:
 
     def _factorise(self) -> RowFactor:
         """The Cholesky factor of ``K + noise``, with the least jitter that it needs."""
-        matrix = covariance(self.kernel, self.observations.points_m, self._gradient_count)
-        factor = RowFactor.of(matrix, self.noise_scale**2 * self.observations.noise_variance)
+        factor = RowFactor.of(self._prior_covariance(), self.noise_scale**2 * self.observations.noise_variance)
         if factor is None:
             raise ShapeError(
                 "the covariance of the contacts is not positive definite",
@@ -280,6 +298,17 @@ class Gpis:
                 hint="Use a shorter kernel length, or larger standard deviations of the contacts",
             )
         return factor
+
+    def _prior_covariance(self) -> Array:
+        return covariance(self.kernel, self.observations.points_m, self._gradient_count)
+
+    def _cross_covariance(self, queries: Array) -> Array:
+        """Prior covariance of the values at q places with all rows, shape (q, rows)."""
+        return cross_covariance(self.kernel, queries, self.observations.points_m, self._gradient_count)
+
+    def _kernel_traces(self, weights: Array) -> Array:
+        """See :func:`log_parameter_traces`."""
+        return log_parameter_traces(self.kernel, self.observations.points_m, self._gradient_count, weights)
 
     def _extended_factor(self, observations: Observations) -> RowFactor | None:
         """The factor extended to these observations with normals, the first of which are the present ones."""
@@ -299,9 +328,14 @@ class Gpis:
         return PosteriorMean(self.kernel, self.prior, points_m, self._weights[: len(points_m)], on_gradients)
 
     def _variance(self, queries: Array, single: Array | None) -> Array:
-        rows = cross_covariance(self.kernel, queries, self.observations.points_m, self._gradient_count)
-        floor = np.finfo(float).eps * self.kernel.amplitude
-        return np.asarray(np.maximum(self.kernel.amplitude - self._factor.explained_variance(rows, single), floor))
+        rows = self._cross_covariance(queries)
+        prior = self._prior_variance
+        floor = np.finfo(float).eps * prior
+        return np.asarray(np.maximum(prior - self._factor.explained_variance(rows, single), floor))
+
+    @property
+    def _prior_variance(self) -> float:
+        return self.kernel.amplitude
 
     def _blocks(self, count: int) -> Iterator[slice]:
         size = max(1, _BLOCK_ENTRIES // len(self._residual))

@@ -21,6 +21,7 @@ ShapePart: TypeAlias = Literal[
     "prism",
     "turned",
     "standing field",
+    "sections",
     "strays",
     "contradictions",
     "held-out contacts",

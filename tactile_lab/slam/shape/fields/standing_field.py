@@ -230,11 +230,9 @@ def _fit(gpis: Gpis, contacts: WeightedContacts, rest: Indices, ends_m: list[flo
     images = _images(gpis, contacts, rest, ends_m)
     source = np.concatenate([rest, *(image.source for image in images)])
     vagueness = np.concatenate([np.ones(len(rest)), *(np.full(len(one.source), one.vagueness) for one in images)])
-    field = Gpis.fit(
+    return gpis.refit(
         np.vstack([contacts.points_m[rest], *(image.points_m for image in images)]),
         np.vstack([contacts.normals[rest], *(image.normals for image in images)]),
         vagueness * contacts.point_weights[source] ** -0.5,
         vagueness * contacts.normal_weights[source] ** -0.5,
-        gpis.settings,
     )
-    return field.with_log_parameters(gpis.kernel.log_parameters)

@@ -5,11 +5,13 @@ or a profile that turns about an axis.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.drawn_field import DrawnField, PRICE_nats
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
@@ -77,9 +79,30 @@ def best_spatial_shape(
         evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
         if evidence > most and _earned(fit, evidence, gpis, floor_m):
             best, most = shape, evidence
-    if floor_m is None or "turned" in without:
+    if floor_m is None:
+        return best
+    if not _beyond_doubt(most, gpis) and without.isdisjoint({"field", "standing field", "sections"}):
+        best, most = _likelier(_sectioned(gpis, floor_m), best, most)
+    if "turned" in without:
         return best
     return _turned(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+
+
+def _sectioned(gpis: Gpis, floor_m: float) -> FittedShape | None:
+    """A standing field of what is alike along edges, its evidence reduced by the price of its parameters."""
+    shape = _try_make(lambda: StandingField.fit(DrawnField.along_edges(gpis), floor_m))
+    return replace(shape, log_evidence=shape.log_evidence - PRICE_nats) if isinstance(shape, StandingField) else None
+
+
+def _likelier(shape: FittedShape | None, best: FittedShape, most: float) -> tuple[FittedShape, float]:
+    """A shape and its evidence if that is larger than that of the best so far."""
+    evidence = -np.inf if shape is None or shape.log_evidence is None else shape.log_evidence
+    return (shape, evidence) if shape is not None and evidence > most else (best, most)
+
+
+def _beyond_doubt(evidence: float, gpis: Gpis) -> bool:
+    """Whether a solid explains its contacts so much better than the field that nothing else need be asked."""
+    return evidence - gpis.log_marginal_likelihood() > _BEYOND_DOUBT_nats * len(gpis.contacts_m)
 
 
 def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Turned | None:
@@ -100,9 +123,7 @@ def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> boo
     """Whether a sharp solid with more evidence than the field also passes the cross-validation."""
     if not gpis.settings.without.isdisjoint({"field", "held-out contacts"}):
         return True
-    if evidence - gpis.log_marginal_likelihood() > _BEYOND_DOUBT_nats * len(gpis.contacts_m):
-        return True
-    return foretells_better(fit, gpis, _COARSE_m, floor_m)
+    return _beyond_doubt(evidence, gpis) or foretells_better(fit, gpis, _COARSE_m, floor_m)
 
 
 def _without_strays(gpis: Gpis) -> tuple[Gpis, float]:

@@ -42,6 +42,8 @@ _SECTION_GRID_m = 0.001
 _SPACING = 1.5
 _FOOT_SHARE, _UPRIGHT_SINE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, np.sin(np.deg2rad(20.0)), 0.2, 0.006
 """As for the standing field: how much of the height is mirrored at the table, and how far inward its walls move."""
+_SURE_SIGMAS = 2.0
+"""Walls go on below the table as inclined as they are only if they are not upright by this many standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -206,19 +208,58 @@ def _around(contacts: WeightedContacts, axis_m: Array) -> tuple[float, float]:
 
 
 def _both_halves(half: Gpis, floor_m: float) -> Gpis:
-    """The field of the section on both sides of the axis, its foot continued below the table.
-
-    Walls near the table are mirrored at it, slightly inward, as those of the standing field; so is what faces up, as
-    the inside of a cup's bottom, which would have no thickness otherwise.
-    """
-    points_m, normals, seen = half.contacts_m, half.normals, half.observations
-    above_m = points_m[:, 1] - floor_m
-    feet = np.flatnonzero((normals[:, 1] > -_UPRIGHT_SINE) & (above_m < _FOOT_SHARE * above_m.max()))
-    inset_m = np.minimum(_INSET_SLOPE * np.abs(above_m[feet]), _LARGEST_INSET_m) * (normals[feet, 1] < _UPRIGHT_SINE)
-    below_m = (points_m[feet] - inset_m[:, None] * normals[feet]) * [1, -1] + [0, 2 * floor_m]
-    right_m, right = np.vstack([points_m, below_m]), np.vstack([normals, normals[feet] * [1, -1]])
-    source = np.concatenate([np.arange(len(points_m)), feet])
-    point_sigma_m, normal_sigma = (np.tile(sigma[source], 2) for sigma in (seen.value_sigma_m, seen.gradient_sigma))
-    both_m, both = np.vstack([right_m, right_m * [-1, 1]]), np.vstack([right, right * [-1, 1]])
-    section = Gpis.fit(both_m, both, point_sigma_m, normal_sigma, half.settings)
+    """The field of the section on both sides of the axis, its foot continued below the table."""
+    seen = half.observations
+    rows = np.column_stack([half.contacts_m, half.normals, seen.value_sigma_m, seen.gradient_sigma])
+    right = np.vstack([rows, *_below_table(rows, floor_m)])
+    both = np.vstack([right, right * [-1, 1, -1, 1, 1, 1]])
+    section = Gpis.fit(both[:, :2], both[:, 2:4], both[:, 4], both[:, 5], half.settings)
     return section.with_log_parameters(half.kernel.log_parameters)
+
+
+def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:
+    """Virtual contacts that continue walls and bottom below the table, and walls again where they meet it.
+
+    Walls go on as they are inclined, slightly inward, as those of the standing field. What faces up is mirrored, as the
+    inside of a cup's bottom, which would have no thickness otherwise.
+
+    Args:
+        rows: of each contact place, normal and their two standard deviations, shape (n, 6).
+        floor_m: height of the table.
+
+    Returns:
+        Rows of the same kind. Where walls meet the table they are together as uncertain as a wall is that leans by
+        :data:`_INSET_SLOPE` between its contacts and there.
+    """
+    above_m = rows[:, 1] - floor_m
+    feet = np.flatnonzero((rows[:, 3] > -_UPRIGHT_SINE) & (above_m < _FOOT_SHARE * above_m.max()))
+    near, above_m = rows[feet], above_m[feet]
+    is_wall = near[:, 3] < _UPRIGHT_SINE
+    overhang = _overhang(near[is_wall, 2:4], near[is_wall, 5]) * is_wall
+    inset_m = np.minimum(_INSET_SLOPE * np.abs(above_m), _LARGEST_INSET_m) * is_wall
+    below = near.copy()
+    below[:, :2] = (near[:, :2] - inset_m[:, None] * near[:, 2:4]) * [1, -1] + [0, 2 * floor_m]
+    below[:, 0] -= 2 * overhang * above_m
+    below[:, 3] = -near[:, 3] - 2 * overhang * np.sign(near[:, 2])
+    below[:, 2:4] = _unit(below[:, 2:4])
+    at_table = (near + below)[is_wall] / 2
+    at_table[:, 2:4] = _unit(at_table[:, 2:4])
+    vague = _INSET_SLOPE * np.sqrt(max(len(at_table), 1))
+    at_table[:, 4:] = np.hypot(at_table[:, 4:], vague * np.column_stack([above_m[is_wall], np.ones(len(at_table))]))
+    return below, at_table
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _overhang(walls: Array, sigma_rad: Array) -> float:
+    """Sine of the angle by which outer walls with these normals, shape (n, 2), face the table; zero if they may be
+    upright or stand on a wider foot.
+    """
+    outer = walls[:, 0] > _SIDEWAYS
+    if not outer.any():
+        return 0.0
+    weights = sigma_rad[outer] ** -2
+    down = -float(np.average(walls[outer, 1], weights=weights))
+    return down if down > _SURE_SIGMAS / np.sqrt(weights.sum()) else 0.0

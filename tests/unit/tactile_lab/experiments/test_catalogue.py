@@ -20,7 +20,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "contour-limit": ({"shape": ["L"], "noise": ["50"]}, 4),
     "methods-3d": ({"shape": ["l-block"], "method": ["known-pose", "odometry"]}, 4),
     "everyday-3d": ({"shape": ["wedge"], "method": ["known-pose"]}, 4),
-    "everyday-shape": ({"shape": ["wedge"]}, 5),
+    "everyday-shape": ({"shape": ["wedge"], "without": ["nothing"]}, 5),
     "solid-limit": ({"shape": ["triangular-prism"]}, 4),
     "known-shape": ({"shape": ["cylinder"]}, 3),
     "methods-6dof": ({"shape": ["ellipsoid"], "method": ["known-pose", "icp"]}, 4),

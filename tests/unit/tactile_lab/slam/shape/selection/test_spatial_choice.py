@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.drawn_field import DrawnField
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.metrics.metrics import mesh_errors
@@ -17,7 +18,15 @@ from tactile_lab.slam.shape.solids.prism import Prism, ear_triangles
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, nearest_on_mesh, polygon_area
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh, extract_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m, l_block
-from tests.support.solid_examples import box_mesh, contacts_on, cylinder_mesh, ellipsoid_mesh, field_on, l_block_mesh
+from tests.support.solid_examples import (
+    box_mesh,
+    contacts_on,
+    cushion_mesh,
+    cylinder_mesh,
+    ellipsoid_mesh,
+    field_on,
+    l_block_mesh,
+)
 
 
 def closed(mesh: SurfaceMesh) -> bool:
@@ -49,6 +58,17 @@ def test_the_field_is_chosen_for_an_ellipsoid_and_is_not_widened_at_the_table() 
     assert shape.name == "standing gpis"
     alone = mesh_errors(extract_mesh(field, floor_m=0.0), ellipsoid_mesh())
     assert mesh_errors(shape.mesh(), ellipsoid_mesh()).hausdorff_m < alone.hausdorff_m + 0.0005
+
+
+def test_a_field_of_what_is_alike_along_edges_is_chosen_for_a_carton_with_bulging_sides() -> None:
+    carton = cushion_mesh()
+    field = field_on(carton, 70, seed=2)
+    shape = best_shape(field, floor_m=0.0)
+    assert isinstance(shape, StandingField)
+    assert isinstance(shape.field, DrawnField)
+    alone = StandingField.fit(field, 0.0)
+    found, before = (mesh_errors(each.mesh(0.005), carton).hausdorff_m for each in (shape, alone))
+    assert found < 0.005 < before
 
 
 def test_wild_contacts_do_not_spoil_a_box() -> None:

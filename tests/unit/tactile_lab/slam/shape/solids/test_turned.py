@@ -16,7 +16,8 @@ from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.revolving import generatrix, revolve
 from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.surfaces.surface import Contour
-from tests.support.solid_examples import box_mesh, field_on
+from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
+from tests.support.solid_examples import box_mesh, contacts_on, field_on
 
 
 def vase() -> trimesh.Trimesh:
@@ -57,6 +58,16 @@ def test_its_part_of_the_choice_can_be_left_out() -> None:
     same = Gpis.fit(field.contacts_m, field.normals, seen.value_sigma_m, seen.gradient_sigma, left_out)
     shape = best_shape(same.with_log_parameters(field.kernel.log_parameters), floor_m=0.0)
     assert shape.name != "turned"
+
+
+def test_a_tapered_wall_goes_on_to_the_table_as_it_is_inclined() -> None:
+    beaker = turned([0, 20, 36, 0], [0, 0, 80, 80])
+    points_m, normals = contacts_on(beaker, 220, seed=4)
+    felt = points_m[:, 2] > 0.02
+    field = Gpis.fit(points_m[felt], normals[felt], POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
+    surface = Turned.fit(field, 0.0).mesh()
+    foot = surface.vertices[surface.vertices[:, 2] < 0.004]
+    assert np.linalg.norm(foot[:, :2], axis=1).max() < 0.0225
 
 
 def test_a_box_has_no_axis() -> None:
