@@ -15,6 +15,7 @@ from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, known_shape
 from tactile_lab.experiments.data import planar_data
+from tactile_lab.slam.doubt.assessment import Assessment
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 
 GRASPS, BEGINNING = 200, 20
@@ -70,14 +71,20 @@ class _ShapeAlone:
 
     def __init__(self, slam: TactileSlam) -> None:
         self._slam, self._settings = slam, ExplorationSettings()
+        self._known: KnownShape | None = None
 
     def on_estimate(self, index: int, is_placed: bool) -> None:
         """Nothing is planned."""
 
     def known_shape(self) -> KnownShape | None:
         """As the planner's."""
-        field = self._slam.surface
-        return None if field is None else known_shape(field, 2, self._slam.origin_height_m, self._settings)
+        field, height_m = self._slam.surface, self._slam.origin_height_m
+        self._known = None if field is None else known_shape(field, 2, height_m, self._settings)
+        return self._known
+
+    def assessment(self) -> Assessment:
+        """As the planner's, of the shape that was measured last."""
+        return self._slam.assess(None if self._known is None else self._known.extracted)
 
 
 def _resident_MB() -> float:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError
 from drivers.simulation.objects import CATALOGUE, check_object
 from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
@@ -23,9 +23,8 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
     """The objects of a sweep, by default the whole catalogue; errors of every run are found here.
 
     Raises:
-        ConfigurationError: no such rig, object or calibration, a mesh that cannot be used, or a method that needs the
-            truth.
-        SessionError: the folder of the sessions cannot be made.
+        ConfigurationError: no such rig, object or calibration, a mesh that cannot be used, a method that needs the
+            truth, or a folder of the sessions that cannot be made.
     """
     refuse_known_pose(method)
     loaded = load_rig(rig)
@@ -36,7 +35,7 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         hint = "Choose another folder with --out"
-        raise SessionError(f"cannot be created ({error.strerror})", where=str(root), hint=hint) from error
+        raise ConfigurationError(f"cannot be created ({error.strerror})", where=str(root), hint=hint) from error
     return tuple(objects or CATALOGUE)
 
 

@@ -160,7 +160,7 @@ def test_an_object_that_is_not_in_the_catalogue(inside, tmp_path):
 def test_a_folder_for_sessions_that_is_a_file(inside, tmp_path):
     (tmp_path / "file").write_text("")
     for command in ("run", "sweep"):
-        one_line(inside(command, "--out", tmp_path / "file"), 1, str(tmp_path / "file"), "Choose another folder")
+        one_line(inside(command, "--out", tmp_path / "file"), 2, str(tmp_path / "file"), "Choose another folder")
 
 
 def test_a_list_of_sessions_in_a_file(inside, tmp_path):

@@ -29,7 +29,8 @@ BIAS = np.array([0.3, -0.2, 1.1, 0.004, -0.002, 0.001])
 
 @pytest.fixture
 def calibration() -> FingertipCalibration:
-    return load_fingertips(TIPS)["FF"]
+    """With a hard skin: what is pressed here is where the ellipsoid ends."""
+    return load_fingertips(TIPS)["FF"].model_copy(update={"yield_m": 0.0})
 
 
 @pytest.fixture
