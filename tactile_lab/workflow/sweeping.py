@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from drivers.core.errors import ConfigurationError
+from drivers.core.errors import ConfigurationError, SessionError
 from drivers.simulation.objects import CATALOGUE, check_object
 from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
