@@ -6,6 +6,8 @@ import json
 import re
 from pathlib import Path
 
+import pytest
+
 from tests.support.low_rig import low_rig
 
 EVALUATION_KEYS = {
@@ -74,6 +76,7 @@ def test_a_replay_in_another_process_is_identical(tactile_lab, session_copy):
     same_bytes(session_copy / "results", session_copy / "replay")
 
 
+@pytest.mark.long
 def test_a_second_run_with_the_same_seed_gives_the_same_files(inside, recorded, tmp_path):
     assert inside("run", "--rig", low_rig(tmp_path.parent), "--grasps", 2, "--seed", 1, "--out", tmp_path).code == 0
     (again,) = tmp_path.iterdir()

@@ -207,6 +207,7 @@ def test_few_contacts_leave_a_large_uncertainty_and_are_survived(method: str) ->
     assert registration_mm(data, result) < 8.0
 
 
+@pytest.mark.long
 def test_a_tenth_of_torn_contacts_is_survived() -> None:
     data = simulate("ellipse", 1, count=10, outlier_share=0.1)
     result = run(data)

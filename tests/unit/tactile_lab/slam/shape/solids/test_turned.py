@@ -33,6 +33,7 @@ def body(line_m: list[list[float]], step_m: float = 0.004) -> trimesh.Trimesh:
     return trimesh.Trimesh(faceted.vertices_m, faceted.triangles, process=False)
 
 
+@pytest.mark.long
 def test_a_hollow_vase_is_told_by_its_profile() -> None:
     mesh = vase()
     field = field_on(mesh, 140, seed=1)
