@@ -55,6 +55,7 @@ def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(program,
     assert 1 <= evaluation["grasps"] <= 2
 
 
+@pytest.mark.long
 def test_two_requests_end_at_once_and_the_recording_replays(program, tmp_path, inside):
     process = start(program, tmp_path)
     process.until(r"^ +1/8 ")

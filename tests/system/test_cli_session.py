@@ -68,6 +68,7 @@ def test_the_report_fetches_nothing(recorded):
     assert not re.findall(r"""<(?:script|img|transport|iframe)[^>]+(?:src|href)=["'](?!data:|#)""", page)
 
 
+@pytest.mark.long
 def test_a_replay_in_another_process_is_identical(tactile_lab, session_copy):
     answer = tactile_lab("session", "replay", session_copy, "--json")
     assert answer.code == 0

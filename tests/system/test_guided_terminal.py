@@ -74,6 +74,7 @@ def grasp(terminal: Terminal) -> None:
     terminal.until("Close the fingers", "g")
 
 
+@pytest.mark.long
 def test_person_guides_a_session_with_undo_pause_an_unplugged_sensor_and_a_resume(tmp_path: Path) -> None:
     terminal = Terminal(tmp_path, "--grasps", "3", "--seed", "2")
     before = terminal.modes

@@ -24,6 +24,7 @@ def opened(terminal: Terminal) -> str:
     return terminal.told.rpartition("page: ")[2]
 
 
+@pytest.mark.long
 def test_a_wizard_is_led_from_its_page(program: WarmProgram, tmp_path: Path) -> None:
     browser_program = chromium()
     if browser_program is None:

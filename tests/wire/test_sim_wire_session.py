@@ -142,6 +142,7 @@ def test_a_hand_process_that_dies_ends_the_session_in_order(
     check_ended_in_order(folder, "its process has ended")
 
 
+@pytest.mark.long
 def test_an_estimation_whose_process_dies_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
