@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from drivers.core.errors import ConfigurationError, WriteError
 
@@ -52,9 +53,27 @@ def refuse_existing(targets: Sequence[Path]) -> None:
 
 def refuse_unwritable(target: Path) -> None:
     """Before hours of work: a file that could not be written at their end. Raises ConfigurationError."""
-    folder = next(parent for parent in target.absolute().parents if parent.exists())
-    if target.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise ConfigurationError("cannot be written", where=str(target), hint="Choose another file")
+    if target.is_dir():
+        raise ConfigurationError("is a folder", where=str(target), hint="Name a file")
+    _refuse_closed(target.absolute().parent, target, "Choose another file")
+
+
+def refuse_unwritable_folder(target: Path) -> None:
+    """The same of a folder, there or not, in which files are to be written. Raises ConfigurationError."""
+    _refuse_closed(target.absolute(), target, "Choose another folder")
+
+
+def _refuse_closed(folder: Path, target: Path, hint: str) -> None:
+    """Permissions alone do not tell: a nameless file is made in the nearest folder there is."""
+    try:
+        nearest = next(place for place in (folder, *folder.parents) if os.path.lexists(place))
+        if not nearest.is_dir():
+            raise ConfigurationError(f"cannot be written ({nearest} is not a folder)", where=str(target), hint=hint)
+        TemporaryFile(dir=nearest).close()
+    except OSError as error:
+        raise ConfigurationError(
+            write_failure(error), where=str(target), hint=f"{hint}, or check its permissions"
+        ) from error
 
 
 @contextmanager

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from drivers.core.atomic_files import write_failure
 from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import ConfigurationError, TactileLabError, WriteError
 from drivers.core.installed.extras import LazyPackage
@@ -105,4 +107,5 @@ def _write_pictures(group: h5py.Group, pictures: list[tuple[int, bytes]]) -> Non
 def _unwritable(path: Path, error: OSError) -> TactileLabError:
     if path.exists():
         return ConfigurationError("exists already", where=str(path), hint="Choose another name")
-    return WriteError(f"cannot be written ({error.strerror or error})", where=str(path), hint="Choose another name")
+    ours = OSError(error.errno, os.strerror(error.errno)) if error.errno else error  # in HDF5's there are its own words
+    return WriteError(write_failure(ours), where=str(path), hint="Choose another name")

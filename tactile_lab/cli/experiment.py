@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.completion import complete_experiment
-from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, MOST_JOBS, Json, Merge, NoInput, ParquetFile, Scheduler
+from tactile_lab.cli.options import (
+    LARGEST_SEED,
+    MOST_GRASPS,
+    MOST_JOBS,
+    Json,
+    Merge,
+    NoInput,
+    ParquetFile,
+    Scheduler,
+    writable_folder,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -33,7 +43,10 @@ def experiment(
         str, typer.Option(help="Random seeds, for example 0-2,7. Seeds from 1000 on are reserved for reported results.")
     ] = ("1000-1029"),
     jobs: Annotated[int, typer.Option(min=0, max=MOST_JOBS, help="Number of parallel runs; 0 uses all cores.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Folder for the results (default: runs/experiments/NAME).")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the results (default: runs/experiments/NAME).", callback=writable_folder),
+    ] = None,
     only: Annotated[
         list[str] | None,
         typer.Option(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from tactile_lab.cli.options import Json
+from tactile_lab.cli.options import Json, writable_folder
 
 if TYPE_CHECKING:
     from drivers.camera.boards import AnyBoard
@@ -66,7 +66,9 @@ def markers(
     ] = None,
     rig: Annotated[str, typer.Option(help="With 'rig': the rig whose two markers are printed.")] = "sim",
     paper: Annotated[str, typer.Option(help="Paper size: A4, A3, A2 or letter.")] = "A4",
-    out: Annotated[Path, typer.Option(help="Folder to write the files to.")] = Path("markers"),
+    out: Annotated[Path, typer.Option(help="Folder to write the files to.", callback=writable_folder)] = Path(
+        "markers"
+    ),
     measured_mm: Annotated[
         float | None,
         typer.Option(

@@ -115,15 +115,31 @@ Merge = Annotated[
 ]
 
 
-def _check_parquet(path: Path | None) -> Path | None:
-    """A package that is missing, and a file that cannot be written, are named before hours of runs, not after them."""
+def writable_file(path: Path | None) -> Path | None:
+    """A file that cannot be written is named before minutes or hours of work, not after them."""
     if path is not None:
         from drivers.core.atomic_files import refuse_unwritable
+
+        refuse_unwritable(path)
+    return path
+
+
+def writable_folder(path: Path | None) -> Path | None:
+    """The same of a folder, there or not, in which files are to be written."""
+    if path is not None:
+        from drivers.core.atomic_files import refuse_unwritable_folder
+
+        refuse_unwritable_folder(path)
+    return path
+
+
+def _check_parquet(path: Path | None) -> Path | None:
+    """A package that is missing is named as early."""
+    if path is not None:
         from drivers.core.installed.extras import require_package
 
         require_package("pyarrow")
-        refuse_unwritable(path)
-    return path
+    return writable_file(path)
 
 
 ParquetFile = Annotated[

@@ -133,7 +133,7 @@ def test_a_lens_of_another_rig_or_changed_by_hand_gives_no_truth(
         (("first", "first"), "first: is given twice"),
         (("first", "second", "--results", "magic"), "has no results called 'magic'"),
         (("first", "--lens", "nowhere.yaml"), "nowhere.yaml: cannot be read"),
-        (("first", "--results", "results", "--out", "{file}"), "is not a folder). Choose another folder with --out"),
+        (("first", "--results", "results", "--out", "{file}"), "is not a folder). Choose another folder"),
     ],
 )
 def test_comparisons_that_can_not_be_made_are_refused(

@@ -136,12 +136,6 @@ def test_a_table_that_does_not_fit_is_refused_and_no_log_is_made(inside, tmp_pat
     assert [path.name for path in tmp_path.iterdir()] == ["other.csv"]
 
 
-def test_a_log_that_can_not_be_written_is_named(inside, tmp_path):
-    (tmp_path / "other.csv").write_text(GOOD)
-    options = ("--out", tmp_path / "other.csv" / "log.json")
-    refused(inside("session", "import", tmp_path / "other.csv", *options), 1, "log.json", "cannot be written")
-
-
 def test_a_true_mesh_in_millimetres_or_that_is_missing_is_named(inside, tmp_path):
     (tmp_path / "other.csv").write_text("time_s,x_m,y_m,z_m,nx,ny,nz\n0,0.05,0,0,1,0,0\n1,-0.05,0,0,-1,0,0\n")
     refused(inside("session", "import", tmp_path / "other.csv", "--mesh", tmp_path / "no.ply"), 2, "no.ply")
@@ -191,13 +185,6 @@ def test_a_session_is_exported_in_every_form_and_opens_in_programs_that_are_not_
         assert archive.testzip() is None
     for form, name in forms.items():
         refused(inside("session", "export", piece, f"--{form}", tmp_path / name), 2, name, "exists already")
-
-
-@pytest.mark.parametrize("form", ["csv", "hdf5", "parquet", "lerobot", "rosbag", "foxglove", "rerun", "archive"])
-def test_an_export_to_where_nothing_can_be_written_is_refused(inside, piece, recorded, tmp_path, form):
-    (tmp_path / "file").write_text("in the way")
-    session = recorded if form == "contacts" else piece
-    refused(inside("session", "export", session, f"--{form}", tmp_path / "file" / "x"), 1, "cannot be written")
 
 
 def test_trajectories_are_exported_as_other_programs_read_them(inside, recorded, piece, tmp_path):

@@ -114,11 +114,3 @@ def test_what_can_not_be_printed_or_measured_is_named_and_nothing_is_written(
     answer = inside("markers", *given, "--out", tmp_path / "out", "--no-input")
     assert (answer.code, told in answer.err) == (code, True), answer.err
     assert files(tmp_path) == ["other.yaml"]
-
-
-def test_a_folder_that_can_not_be_made_is_named(inside: Any, tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("mine")
-    answer = inside("markers", "single", "--out", tmp_path / "out", "--no-input")
-    assert (answer.code, "out is not a folder). Choose another folder with --out" in answer.err) == (1, True), (
-        answer.err
-    )

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from drivers.biotac.normal_training import MethodErrors
 
 from tactile_lab.cli.calibrate.steps import OUTSIDE
-from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.options import Json, NoInput, writable_file
 
 
 class Finger(StrEnum):
@@ -37,7 +37,10 @@ def biotac(
     serial: Annotated[str, typer.Option(help="Serial number of the sensor.")] = "",
     out: Annotated[
         Path | None,
-        typer.Option(help="File to write or to add the finger to. Without it the methods are only compared."),
+        typer.Option(
+            help="File to write or to add the finger to. Without it the methods are only compared.",
+            callback=writable_file,
+        ),
     ] = None,
     sensor_frame: Annotated[
         bool,

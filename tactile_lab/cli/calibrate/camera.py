@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.options import Json, NoInput, writable_file
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -27,7 +27,10 @@ def camera(
         typer.Option(help="Description of the board, from 'tactile-lab markers', or Kalibr's target file."),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/camera.yaml")
+        Path | None,
+        typer.Option(
+            help="File to write the result to.", show_default="calibrations/STATION/camera.yaml", callback=writable_file
+        ),
     ] = None,
     measurer: Annotated[
         str, typer.Option(help="Installation (of the rig file) that the camera belongs to.")

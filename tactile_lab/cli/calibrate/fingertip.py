@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.calibrate.biotac import Finger
-from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName, writable_file
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -25,10 +25,16 @@ def fingertip(
     source: Annotated[
         Path | None, typer.Option("--from", help="Solve recorded wrenches instead of measuring (any finger).")
     ] = None,
-    record: Annotated[Path | None, typer.Option(help="Also write the measured wrenches to this file.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Also write the measured wrenches to this file.", callback=writable_file)
+    ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="File to write the result to.", show_default="calibrations/STATION/fingertips.yaml"),
+        typer.Option(
+            help="File to write the result to.",
+            show_default="calibrations/STATION/fingertips.yaml",
+            callback=writable_file,
+        ),
     ] = None,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, speeds, force.")] = None,
     presses: Annotated[int, typer.Option(min=6, max=1000, help="Number of presses on the table.")] = 10,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName, writable_file
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -40,12 +40,19 @@ def forearm(
         ),
     ] = ForearmMethod.TOUCH,
     out: Annotated[
-        Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/forearm.yaml")
+        Path | None,
+        typer.Option(
+            help="File to write the result to.",
+            show_default="calibrations/STATION/forearm.yaml",
+            callback=writable_file,
+        ),
     ] = None,
     source: Annotated[
         Path | None, typer.Option("--from", help="Solve recorded poses instead of measuring (not with manual).")
     ] = None,
-    record: Annotated[Path | None, typer.Option(help="Also write the measured poses to this file.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Also write the measured poses to this file.", callback=writable_file)
+    ] = None,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, least motion, errors, speeds.")] = None,
     geometry: Annotated[Path | None, typer.Option(help="Geometry to press, instead of the rig's.")] = None,
     board: Annotated[Path | None, typer.Option(help="Board on the hand, instead of the rig's.")] = None,

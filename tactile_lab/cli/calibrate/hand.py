@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName, writable_file
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -33,10 +33,15 @@ def joints(
     fingers: Annotated[str, typer.Option(help="Fingers that press the block (not the thumb).")] = "FF,MF,RF",
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of presses per face and posture.")] = 1,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, errors, speeds.")] = None,
-    record: Annotated[Path | None, typer.Option(help="Also write the measured touches or poses to this file.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Also write the measured touches or poses to this file.", callback=writable_file)
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
     out: Annotated[
-        Path | None, typer.Option(help="File to write the result to.", show_default="calibrations/STATION/joints.yaml")
+        Path | None,
+        typer.Option(
+            help="File to write the result to.", show_default="calibrations/STATION/joints.yaml", callback=writable_file
+        ),
     ] = None,
     replace: Replace = False,
     notes: Notes = "",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 from typer import Exit
 
+from drivers.core.atomic_files import refuse_unwritable
 from drivers.core.errors import ConfigurationError, InterruptionError, TactileLabError
 from sessions.recording.recorder import NullTraffic, TrafficSink
 from tactile_lab.cli.console import people, say, tell_also, warn
@@ -181,9 +182,10 @@ def may_write(out: Path, replace: bool, asker: Asker, silent: bool) -> None:
     """Whether a file may be written: a new one always, an existing one if the person agrees.
 
     Raises:
-        ConfigurationError: it exists, and nobody agreed to replace it.
+        ConfigurationError: it cannot be written, or exists, and nobody agreed to replace it.
         InterruptionError: the person does not want that.
     """
+    refuse_unwritable(out)
     if replace or not out.exists():
         return
     if silent:

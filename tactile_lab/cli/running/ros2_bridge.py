@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.completion import complete_object, complete_policy
-from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, AllowUncalibrated, MethodName, RigName
+from tactile_lab.cli.options import LARGEST_SEED, MOST_GRASPS, AllowUncalibrated, MethodName, RigName, writable_folder
 from tactile_lab.cli.running.run import Mode
 
 if TYPE_CHECKING:
@@ -43,7 +43,9 @@ def ros2_bridge(
     mode: Annotated[
         Mode, typer.Option(help="autonomous: the program decides; guided: the node's clients do.")
     ] = Mode.AUTONOMOUS,
-    out: Annotated[Path, typer.Option(help="Folder in which the sessions' folders are created.")] = Path("runs"),
+    out: Annotated[
+        Path, typer.Option(help="Folder in which the sessions' folders are created.", callback=writable_folder)
+    ] = Path("runs"),
     sessions: Annotated[
         int, typer.Option(min=0, max=1000, help="End after so many sessions; 0: at Ctrl+C.", show_default="0")
     ] = 0,

@@ -19,6 +19,7 @@ from tactile_lab.cli.options import (
     MethodName,
     NoInput,
     RigName,
+    writable_folder,
 )
 from tactile_lab.cli.running.live_address import LIVE_PORT, Live, LiveAddress, LiveOrigin, LivePort
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
@@ -60,7 +61,9 @@ def run(
     dimension: Annotated[int, typer.Option(min=2, max=3, help="2: estimate a horizontal contour; 3: a surface.")] = 2,
     method: MethodName = "joint",
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of the session.")] = 0,
-    out: Annotated[Path, typer.Option(help="Folder in which the session's folder is created.")] = Path("runs"),
+    out: Annotated[
+        Path, typer.Option(help="Folder in which the session's folder is created.", callback=writable_folder)
+    ] = Path("runs"),
     notes: Annotated[str, typer.Option(help="Notes to store with the session.")] = "",
     mode: Annotated[
         Mode, typer.Option(help="autonomous: the program decides; guided: a person decides.")

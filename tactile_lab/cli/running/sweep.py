@@ -18,6 +18,7 @@ from tactile_lab.cli.options import (
     ParquetFile,
     RigName,
     Scheduler,
+    writable_folder,
 )
 
 
@@ -29,7 +30,9 @@ def sweep(
     grasps: Annotated[int, typer.Option(min=1, max=MOST_GRASPS, help="Number of grasps per session.")] = 16,
     rig: RigName = "sim",
     jobs: Annotated[int, typer.Option(min=1, max=MOST_JOBS, help="Number of parallel sessions.")] = 2,
-    out: Annotated[Path, typer.Option(help="Folder for the sessions and table.md.")] = Path("runs/sweep"),
+    out: Annotated[Path, typer.Option(help="Folder for the sessions and table.md.", callback=writable_folder)] = Path(
+        "runs/sweep"
+    ),
     check_replay: Annotated[
         bool,
         typer.Option("--check-replay", help="Replay every session; a session whose replay differs counts as failed."),

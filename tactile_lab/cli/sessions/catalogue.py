@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput
+from tactile_lab.cli.options import Json, NoInput, writable_file
 
 
 def catalogue(
@@ -15,7 +15,8 @@ def catalogue(
         list[Path] | None, typer.Argument(metavar="[FOLDER]...", help="Folders of sessions.", show_default="runs")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the table to this .parquet or .csv file.")
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the table to this .parquet or .csv file.", callback=writable_file),
     ] = None,
     as_json: Json = False,
     no_input: NoInput = False,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import LAST, Json, NoInput, Root
+from tactile_lab.cli.options import LAST, Json, NoInput, Root, writable_folder
 from tactile_lab.cli.sessions.choosing import choose_session
 
 if TYPE_CHECKING:
@@ -45,7 +45,10 @@ def evaluate(
             help="Compute the ground truth from the recorded corners, or detect markers in the pictures again.",
         ),
     ] = Basis.CORNERS,
-    out: Annotated[Path | None, typer.Option(help="Folder for the comparison: table, CSV, JSON and plot.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the comparison: table, CSV, JSON and plot.", callback=writable_folder),
+    ] = None,
     root: Root = Path("runs"),
     as_json: Json = False,
     no_input: NoInput = False,

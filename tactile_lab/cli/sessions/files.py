@@ -8,13 +8,16 @@ from typing import Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput, Root, SessionName
+from tactile_lab.cli.options import Json, NoInput, Root, SessionName, writable_file, writable_folder
 from tactile_lab.cli.sessions.choosing import choose_session
 
 
 def extract(
     session: SessionName,
-    into: Annotated[Path, typer.Option(help="Folder of the new session; its name becomes the session's name.")],
+    into: Annotated[
+        Path,
+        typer.Option(help="Folder of the new session; its name becomes the session's name.", callback=writable_folder),
+    ],
     root: Root = Path("runs"),
     begin: Annotated[float | None, typer.Option("--from", help="In seconds after the first message.")] = None,
     end: Annotated[float | None, typer.Option("--to", help="In seconds after the first message.")] = None,
@@ -79,7 +82,7 @@ def export(
     """Export a session to other formats: its grasps as a contact log, its samples as tables, or the whole session."""
     from dataclasses import asdict
 
-    from drivers.core.atomic_files import refuse_existing
+    from drivers.core.atomic_files import refuse_existing, refuse_unwritable
     from tactile_lab.cli.console import answer, count, emit_json, say
     from tactile_lab.workflow import exporting
     from tactile_lab.workflow.exporters import export_as
@@ -98,9 +101,12 @@ def export(
     }
     others = _places(other or ())
     places = [place for place in (contacts, *kinds.values()) if place is not None]
-    if not places and not others:
+    places += [place for _, place in others]
+    if not places:
         raise typer.BadParameter("give at least one of --contacts, --" + ", --".join([*kinds, "as"]))
-    refuse_existing([*places, *(place for _, place in others)])
+    refuse_existing(places)
+    for target in places:
+        refuse_unwritable(target)
     found, told = choose_session(root, session), dict[str, object]()
     if contacts is not None:
         log = exporting.export_contacts(found, contacts, dimension)
@@ -143,7 +149,11 @@ def bring_in(
     name: Annotated[str | None, typer.Option(help="Name of the new session.", show_default="from the archive")] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="Write the contact log made from timed contacts to this file.", show_default="FILE-log.json"),
+        typer.Option(
+            help="Write the contact log made from timed contacts to this file.",
+            show_default="FILE-log.json",
+            callback=writable_file,
+        ),
     ] = None,
     mesh: Annotated[
         Path | None, typer.Option(help="Timed contacts: mesh of the true object, closed, in metres.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput, Root, SessionName
+from tactile_lab.cli.options import Json, NoInput, Root, SessionName, writable_folder
 from tactile_lab.cli.sessions.choosing import choose_session
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def models() -> None:
 @app.command()
 def export(
     session: SessionName,
-    out: Annotated[Path, typer.Option(help="New folder for the files.")],
+    out: Annotated[Path, typer.Option(help="New folder for the files.", callback=writable_folder)],
     formats: Annotated[str, typer.Option("--format", help=_FORMATS, show_default="all that are installed")] = "",
     mass_kg: Annotated[
         float | None,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from tactile_lab.cli.completion import complete_session, complete_shape
-from tactile_lab.cli.options import LARGEST_SEED, LAST, SHAPE_HELP, Json, NoInput, OtherMethod, Root
+from tactile_lab.cli.options import LARGEST_SEED, LAST, SHAPE_HELP, Json, NoInput, OtherMethod, Root, writable_folder
 from tactile_lab.cli.sessions.choosing import resolve_name
 
 
@@ -48,7 +48,10 @@ def reconstruct(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for the results.", show_default="next to the data, named by method")
+        Path | None,
+        typer.Option(
+            help="Folder for the results.", show_default="next to the data, named by method", callback=writable_folder
+        ),
     ] = None,
     root: Root = Path("runs"),
     as_json: Json = False,

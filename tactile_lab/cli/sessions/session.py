@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, OtherMethod, Root, SessionName
+from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, OtherMethod, Root, SessionName, writable_folder
 from tactile_lab.cli.sessions import catalogue as session_catalogue
 from tactile_lab.cli.sessions import files as session_files
 from tactile_lab.cli.sessions import slips as session_slips
@@ -63,7 +63,8 @@ def replay(
     session: SessionName,
     root: Root = Path("runs"),
     into: Annotated[
-        Path | None, typer.Option(help="Folder for the new results.", show_default="SESSION/replay")
+        Path | None,
+        typer.Option(help="Folder for the new results.", show_default="SESSION/replay", callback=writable_folder),
     ] = None,
     method: OtherMethod = None,
     dimension: Annotated[

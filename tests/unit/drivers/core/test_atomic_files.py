@@ -7,7 +7,7 @@ import os
 
 import pytest
 
-from drivers.core.atomic_files import refuse_unwritable, write_whole
+from drivers.core.atomic_files import refuse_unwritable, refuse_unwritable_folder, write_whole
 from drivers.core.errors import ConfigurationError, WriteError
 
 
@@ -63,10 +63,26 @@ def test_a_file_in_the_place_of_a_folder_is_told(old):
         write_whole(old / "inside", "new", "Use --out")
 
 
-def test_a_file_that_could_not_be_written_later_is_refused_now(tmp_path):
+def test_a_place_that_could_not_be_written_later_is_refused_now(tmp_path):
     (tmp_path / "file").touch()
-    for target in (tmp_path, tmp_path / "file" / "table.parquet"):
-        with pytest.raises(ConfigurationError, match="cannot be written"):
-            refuse_unwritable(target)
+    with pytest.raises(ConfigurationError, match=r"is a folder\. Name a file"):
+        refuse_unwritable(tmp_path)
+    for refuse in (refuse_unwritable, refuse_unwritable_folder):
+        with pytest.raises(ConfigurationError, match=r"cannot be written \(.*file is not a folder\)"):
+            refuse(tmp_path / "file" / "below" / "it")
+        refuse(tmp_path / "new" / "place")
     refuse_unwritable(tmp_path / "file")
-    refuse_unwritable(tmp_path / "new" / "table.parquet")
+    refuse_unwritable_folder(tmp_path)
+    assert [item.name for item in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOENT])
+def test_a_folder_that_takes_no_file_is_refused_whatever_its_permissions_say(tmp_path, monkeypatch, number):
+    def refuse(**where):
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("drivers.core.atomic_files.TemporaryFile", refuse)
+    with pytest.raises(
+        ConfigurationError, match=rf"cannot be written \({os.strerror(number)}\). Choose another folder"
+    ):
+        refuse_unwritable_folder(tmp_path)
