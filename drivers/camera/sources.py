@@ -44,7 +44,12 @@ class OpenCvSource:
         self._last_ns: int | None = None
 
     def open(self) -> None:
-        """Open the device and set exposure, gain and focus where possible. Raises DeviceError."""
+        """Open the device and set exposure, gain and focus where possible.
+
+        Raises:
+            ConfigurationError: a file that is no film.
+            DeviceError: the device or pipeline cannot be opened.
+        """
         kind, name = self._settings.place()
         if kind == "gstreamer" and "GStreamer:                   YES" not in cv2.getBuildInformation():
             hint = "Install an OpenCV with GStreamer, or use the camera's device file"
@@ -53,7 +58,9 @@ class OpenCvSource:
         back_end = {"device": cv2.CAP_V4L2, "gstreamer": cv2.CAP_GSTREAMER}.get(kind, cv2.CAP_ANY)
         capture = self._make(number, back_end)
         if not capture.isOpened():
-            hint = "Check its cable and permissions" if kind == "device" else "Check the file or pipeline"
+            if Path(name).is_file():
+                raise ConfigurationError("cannot be opened as a film", where=name, hint="Check the file")
+            hint = "Check its cable and permissions" if kind == "device" else "Check the pipeline"
             raise DeviceError("cannot be opened", where=f"camera {name}", hint=hint)
         self._capture = capture
         if kind == "device":
@@ -148,7 +155,7 @@ class FolderSource:
         self._next = 0
 
     def read(self) -> Picture | None:
-        """The next picture. Raises DeviceError if it cannot be read or has another size."""
+        """The next picture. Raises ConfigurationError if it cannot be read or has another size."""
         if self._next == len(self._files):
             return None
         file = self._files[self._next]
@@ -158,12 +165,12 @@ class FolderSource:
         with suppress(cv2.error):  # more pixels than the library is allowed to make
             image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is None:
-            raise DeviceError("is not a readable picture", where=str(file), hint="Remove it from the folder")
+            raise ConfigurationError("is not a readable picture", where=str(file), hint="Remove it from the folder")
         self._size = self._size or image.shape
         if image.shape != self._size:
             shown = [f"{width} x {height}" for height, width in (image.shape, self._size)]
             what = f"has {shown[0]} pixels, but the previous pictures {shown[1]}"
-            raise DeviceError(what, where=str(file), hint="Use pictures of one camera at one resolution")
+            raise ConfigurationError(what, where=str(file), hint="Use pictures of one camera at one resolution")
         return Picture(self._clock.now_ns(), self._counter, 0, np.asarray(image, np.uint8), file.name)
 
     def close(self) -> None:

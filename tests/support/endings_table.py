@@ -129,6 +129,7 @@ class Ending:
         terminal: whether it runs on a terminal.
         words: further options.
         disk: size of a small file system to record on, as for ``mount``; "" for the usual one.
+        rig: a built-in rig; "" for the simulated one, which waits for nothing.
     """
 
     strike: Callable[[Running], None] = lambda running: None
@@ -136,6 +137,7 @@ class Ending:
     terminal: bool = False
     words: tuple[str, ...] = ()
     disk: str = ""
+    rig: str = ""
 
 
 # --- what is done to it --------------------------------------------------------------------------------------------
@@ -232,6 +234,7 @@ def _beside_another(running: Running) -> None:
     assert os.waitstatus_to_exitcode(os.waitpid(other, 0)[1]) == 0
 
 
+_WIRES = "sim-wire"
 _GUIDED = ("--mode", "guided", "--pace", "0")
 ENDINGS: dict[str, Ending] = {
     "nothing": Ending(),
@@ -255,6 +258,10 @@ ENDINGS: dict[str, Ending] = {
     "a disk that stands still for 15 s": Ending(prepare=_bad_disk(_stand_still)),
     "a disk that goes away": Ending(prepare=_bad_disk(_go_away)),
     "a full disk": Ending(disk="size=700k"),
+    "in real time, devices on wires": Ending(rig=_WIRES),
+    "the same on a disk of 100 kB/s": Ending(prepare=_bad_disk(_take_time), rig=_WIRES),
+    "the same on a disk that goes away": Ending(prepare=_bad_disk(_go_away), rig=_WIRES),
+    "the same on a full disk": Ending(disk="size=5000k", rig=_WIRES),
 }
 
 
@@ -269,7 +276,8 @@ def run(ending: Ending) -> tuple[str, ...]:
         if ending.disk:
             subprocess.run(["mount", "-t", "tmpfs", "-o", ending.disk, "tmpfs", str(folder / "runs")], check=True)
             stack.callback(subprocess.run, ["umount", "-l", str(folder / "runs")], check=True)
-        words = ["run", "--rig", str(low_rig(folder)), "--grasps", "1", "--seed", "1", "--method", "odometry"]
+        rig = ending.rig or str(low_rig(folder))
+        words = ["run", "--rig", rig, "--grasps", "1", "--seed", "1", "--method", "odometry"]
         running = Running(folder, [*words, *ending.words], terminal=ending.terminal, prepare=ending.prepare)
         begun = time.monotonic()
         if running.until_recorded():

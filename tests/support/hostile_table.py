@@ -3,8 +3,8 @@
     python -m tests.support.hostile_table --store
     python -m tests.support.hostile_table --only mesh
 
-Each is read by the command line in a copy of one process that has loaded everything. Processor time is what counts: on
-a quiet core it is how long the command takes. The time that loading took is added to each.
+Each is read by the command line in a process of its own. Processor time is what counts: on a quiet core it is how long
+the command takes.
 """
 
 from __future__ import annotations
@@ -21,10 +21,9 @@ from functools import partial
 from pathlib import Path
 
 from drivers.core.child_process import child_command, child_environment
-from tests.support.forked_program import fork_program, side_by_side
+from tests.support.forked_program import side_by_side
 from tests.support.low_rig import low_rig
 from tests.support.stored_table import GrowingTable, Outline, parser
-from tests.support.warm_program import load
 
 MOST_s, MOST_MB = 5.0, 1000.0
 _ENOUGH_s = 60
@@ -87,18 +86,24 @@ class Outcome:
         return ", ".join(words for words, is_so in found.items() if is_so)
 
 
-def read(command: Command, loaded_s: float) -> Outcome:
-    """Run a command in a copy of this process, on a processor time that it cannot use up honestly."""
+def read(command: Command) -> Outcome:
+    """Run a command, on a processor time that it cannot use up honestly."""
     told = command.folder / "said"
-    null, said = os.open(os.devnull, os.O_RDWR), os.open(told, os.O_WRONLY | os.O_CREAT)
-    process = fork_program(command.words, command.folder, (null, null, said), _bound_time)
-    os.close(null)
-    os.close(said)
-    _, status, used = os.wait4(process, 0)
-    text = told.read_text(errors="replace") if told.is_file() else ""
+    with told.open("w") as said:
+        process = subprocess.Popen(
+            child_command("tactile_lab.cli.main", *command.words),
+            cwd=command.folder,
+            env=child_environment(),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=said,
+            preexec_fn=_bound_time,  # there are no other threads
+        )
+        _, status, used = os.wait4(process.pid, 0)
+    text = told.read_text(errors="replace")
     lines = [line for line in text.splitlines() if line.strip()]
     shown = (lines[-1] if lines else "").replace(str(command.folder) + "/", "")
-    seconds = loaded_s + used.ru_utime + used.ru_stime
+    seconds = used.ru_utime + used.ru_stime
     return Outcome(os.waitstatus_to_exitcode(status), seconds, used.ru_maxrss / 1e3, shown, "Traceback" in text)
 
 
@@ -106,9 +111,9 @@ def _bound_time() -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (_ENOUGH_s, _ENOUGH_s))
 
 
-def row(command: Command, loaded_s: float) -> tuple[str, ...]:
+def row(command: Command) -> tuple[str, ...]:
     """What is outside of the bounds, then one line of the table behind its keys."""
-    outcome = read(command, loaded_s)
+    outcome = read(command)
     said = outcome.said if len(outcome.said) <= _SHOWN else outcome.said[:_SHOWN] + " ..."
     said = said.replace("|", "/").encode("ascii", "backslashreplace").decode()
     return (
@@ -185,13 +190,10 @@ def main() -> None:
     options.add_argument("--jobs", type=int, default=1, help="Files side by side.")
     chosen = options.parse_args()
     wrong: list[str] = []
-    load()
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    loaded_s = used.ru_utime + used.ru_stime
     with tempfile.TemporaryDirectory() as root:
         commands = make_all(Path(root), chosen.only, chosen.session)
         table = GrowingTable(chosen.docs, OUTLINE, [command.key for command in commands])
-        works = {command.key: partial(row, command, loaded_s) for command in commands}
+        works = {command.key: partial(row, command) for command in commands}
         for key, (problem, *cells) in side_by_side(works, chosen.jobs):
             table.put(key, cells)
             if problem:

@@ -160,17 +160,24 @@ class DiskThread(threading.Thread):
         prepared, self._prepared = self._prepared, None
         return prepared
 
-    def settle(self, timeout_s: float) -> bool:
-        """Wait until everything queued is written, or writing has failed."""
-        with self._condition:
-            return self._condition.wait_for(lambda: not self._jobs and not self._busy, timeout_s)
+    def settle(self, patience_s: float) -> bool:
+        """Wait until everything queued is written, or writing has failed.
 
-    def end(self, timeout_s: float) -> bool:
-        """Write the queue, and end. Returns False if that takes longer than the timeout."""
+        A slow disk is given the time it needs. Returns False if it has written nothing for ``patience_s``.
+        """
+        with self._condition:
+            while self._jobs or self._busy:
+                if not self._condition.wait(patience_s):
+                    return False
+        return True
+
+    def end(self, patience_s: float) -> bool:
+        """Write the queue, and end. Returns False if the disk has written nothing for ``patience_s``."""
         with self._condition:
             self._ended = True
             self._condition.notify_all()
-        self.join(timeout_s)
+        if self.settle(patience_s):
+            self.join(patience_s)
         return not self.is_alive()
 
     def sync(self) -> None:

@@ -78,6 +78,9 @@ def _steps(written_in: Any, known: tuple[str, ...], where: str) -> tuple[str, ..
     """The versions to convert, oldest first."""
     if written_in in known:
         return known[known.index(written_in) : -1]
+    if written_in is None:
+        hint = "Restore it from a copy of the session"
+        raise SessionDataError("does not say in which version of its format it is written", where=where, hint=hint)
     newer = _number(written_in) > _number(known[-1]) and str(written_in).startswith(known[-1].split("/")[0])
     what = "a newer version of the program" if newer else "a format that this program does not know"
     raise SessionDataError(

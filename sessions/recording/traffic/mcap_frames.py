@@ -47,10 +47,17 @@ class Frames:
     Args:
         file: from its beginning.
         landmarks: offsets at which records are known to begin, by the file's summary; ascending.
+        resumed: where reading went on after damage, by offset and size of the file: who reads it twice searches once.
     """
 
-    def __init__(self, file: BinaryIO, landmarks: Sequence[int] = ()) -> None:
+    def __init__(
+        self,
+        file: BinaryIO,
+        landmarks: Sequence[int] = (),
+        resumed: dict[tuple[int, int], int | None] | None = None,
+    ) -> None:
         self._file, self._landmarks = file, landmarks
+        self._resumed = {} if resumed is None else resumed
         self._size = file.seek(0, 2)
         file.seek(0)
         magic = file.read(len(MCAP0_MAGIC))
@@ -66,7 +73,10 @@ class Frames:
             self._file.seek(start)
             opcode, end = self._record(start)
             if end is None:
-                following = self._resume(start + 1)
+                place = start + 1, self._size
+                if place not in self._resumed:
+                    self._resumed[place] = self._resume(start + 1)
+                following = self._resumed[place]
                 self.unreadable_bytes += (self._size if following is None else following) - start
                 if following is None:
                     return

@@ -120,13 +120,14 @@ class TrafficReader:
         """The writer's facts at the end; complete once :meth:`messages` has been read to the end."""
         self.loss = Loss()
         """Complete once :meth:`messages` has been read to the end."""
+        self._resumed: dict[tuple[int, int], int | None] = {}
         self._convert = self._read_preamble(path)
 
     def messages(self) -> Iterator[TrafficMessage]:
         """All readable messages, from the beginning."""
         self.loss, self.end, expected = Loss(), {}, 0
         for path in segment_paths(self.path):
-            segment = _SegmentMessages(path, self.loss, expected)
+            segment = _SegmentMessages(path, self.loss, expected, self._resumed if path == self.path else {})
             for topic, message in segment:
                 self.loss.missing_messages += (message.sequence - expected) & 0xFFFFFFFF
                 expected = message.sequence + 1
@@ -186,7 +187,7 @@ class TrafficReader:
         notes: list[dict[str, str]] = []
         profile: str | None = None
         with _open(path) as file:
-            frames = Frames(file, read_summary(file).landmarks)
+            frames = Frames(file, read_summary(file).landmarks, self._resumed)
             begun = False
             for opcode, content in frames:
                 begun = begun or opcode not in (DAMAGE, Opcode.HEADER)
@@ -230,11 +231,11 @@ def segment_paths(path: Path) -> list[Path]:
 class _SegmentMessages:
     """The messages of one file with their topics (None if unknown)."""
 
-    def __init__(self, path: Path, loss: Loss, expected: int) -> None:
+    def __init__(self, path: Path, loss: Loss, expected: int, resumed: dict[tuple[int, int], int | None]) -> None:
         self.end: dict[str, str] = {}
         self.lost_at_end = 0
         """Messages lost behind the last one read, by summary or index: no gap in the numbering shows them."""
-        self._path, self._loss = path, loss
+        self._path, self._loss, self._resumed = path, loss, resumed
         self._topics: dict[int, str] = {}
         self._read: Counter[int] = Counter()
         self._indexed: Counter[int] = Counter()
@@ -246,7 +247,7 @@ class _SegmentMessages:
         with _open(self._path) as file:
             summary = read_summary(file)
             self._topics.update(summary.topics)
-            frames = Frames(file, summary.landmarks)
+            frames = Frames(file, summary.landmarks, self._resumed)
             for opcode, content in frames:
                 for record in self._records(opcode, content):
                     if isinstance(record, Channel):

@@ -145,7 +145,7 @@ class TrafficWriter:
         answered = self._disk.end(CLOSE_TIMEOUT_s)
         if not (self._syncer.stop(CLOSE_TIMEOUT_s if answered else 0.0) and answered):
             # the threads are left behind: they wait inside the operating system
-            raise self._end(f"the disk has not answered for {CLOSE_TIMEOUT_s:g} s", "check the disk")
+            raise self._end(f"the disk has written nothing for {CLOSE_TIMEOUT_s:g} s", "check the disk")
         self._close_files()
         try:
             if known is None:

@@ -148,13 +148,13 @@ def test_pictures_of_two_sizes_in_a_folder_are_an_error_that_names_the_file(tmp_
     write_pictures(tmp_path, [(64, 48), (32, 24)])
     source = open_source(CameraSourceSettings(source=str(tmp_path)), VirtualClock())
     source.read()
-    with pytest.raises(DeviceError, match=r"001\.png: has 32 x 24 pixels, but the previous pictures 64 x 48"):
+    with pytest.raises(ConfigurationError, match=r"001\.png: has 32 x 24 pixels, but the previous pictures 64 x 48"):
         source.read()
 
 
 def test_a_damaged_picture_in_a_folder_is_an_error_that_names_it(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"no picture")
-    with pytest.raises(DeviceError, match=r"a\.png: is not a readable picture"):
+    with pytest.raises(ConfigurationError, match=r"a\.png: is not a readable picture"):
         open_source(CameraSourceSettings(source=str(tmp_path)), VirtualClock()).read()
 
 
