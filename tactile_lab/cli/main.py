@@ -68,6 +68,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         complain(_NO_MEMORY)
         sys.exit(1)
     except Exception as error:
+        if isinstance(error, FileNotFoundError) and _folder_is_gone():
+            from tactile_lab.cli.console import complain
+
+            complain("the current folder is not there any more. Change to another one")
+            sys.exit(2)
         if not (words := _NO_MEMORY if _lacks_memory(error) else blamed(error) or _unusable_path(error)):
             raise
         from tactile_lab.cli.console import complain
@@ -94,6 +99,15 @@ def _lacks_memory(error: Exception) -> bool:
     """Whether the system refused memory by another error than MemoryError: for a thread's stack, or a library."""
     refused = isinstance(error, OSError) and error.errno == errno.ENOMEM
     return refused or any(words in str(error) for words in _WORDS_OF_NO_MEMORY)
+
+
+def _folder_is_gone() -> bool:
+    """Whether the folder in which the program stands was removed."""
+    try:
+        os.getcwd()  # noqa: PTH109 - what is needed is its error alone
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def _unusable_path(error: Exception) -> str:

@@ -25,6 +25,8 @@ from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 SIZE_m = (0.050, 0.085, 0.150)
 TURN_rad = 0.3
 
+pytestmark = pytest.mark.long
+
 
 class Forgetful:
     """Where nothing is kept that was written."""

@@ -166,3 +166,10 @@ def test_a_folder_for_sessions_that_is_a_file(inside, tmp_path):
 def test_a_list_of_sessions_in_a_file(inside, tmp_path):
     (tmp_path / "file").write_text("")
     one_line(inside("session", "list", "--root", tmp_path / "file"), 2, "cannot be read")
+
+
+def test_a_current_folder_that_was_removed_is_named(inside, tmp_path, monkeypatch):
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    one_line(inside("run", "--grasps", 1), 2, "the current folder is not there any more. Change to another one")

@@ -33,7 +33,7 @@ def test_a_folder_that_is_no_session(inside, tmp_path, command):
     refused(inside(*command.split(), tmp_path), "not a session folder")
 
 
-@pytest.mark.parametrize("share", [0.95, 0.6])
+@pytest.mark.parametrize("share", [0.95, pytest.param(0.6, marks=pytest.mark.long)])
 def test_a_recording_cut_off_is_replayed_up_to_the_cut(inside, session_copy, share):
     traffic = session_copy / "traffic.mcap"
     whole = traffic.read_bytes()

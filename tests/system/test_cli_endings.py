@@ -43,6 +43,7 @@ def status(folder: Path) -> str:
     return re.findall(r"^status: (\w+)$", (folder / "session.yaml").read_text(), re.M)[0]
 
 
+@pytest.mark.long
 def test_one_request_to_end_finishes_the_grasp_and_judges_what_there_is(program, tmp_path):
     process = start(program, tmp_path)
     process.until(r"^ +1/8 ")
@@ -71,6 +72,7 @@ def test_two_requests_end_at_once_and_the_recording_replays(program, tmp_path, i
     assert json.loads(answer.out)["grasps"] >= 1
 
 
+@pytest.mark.long
 def test_a_killed_session_is_open_and_replays_up_to_the_end(program, tmp_path, inside):
     process = start(program, tmp_path)
     process.until(r"^ +1/8 ")
@@ -97,7 +99,7 @@ def await_heeding(process: subprocess.Popen) -> None:
         time.sleep(0.005)
 
 
-@pytest.mark.parametrize("delay_s", [0.0, 1.5])
+@pytest.mark.parametrize("delay_s", [0.0, pytest.param(1.5, marks=pytest.mark.long)])
 def test_ctrl_c_at_the_beginning(tmp_path, delay_s):
     """At the earliest instant it can heed, and while it loads or has just begun: in a process that loads by itself."""
     words = [sys.executable, "-m", "tactile_lab.cli.main", "run", "--seed", "1", "--out", str(tmp_path)]

@@ -84,6 +84,7 @@ def test_a_second_run_with_the_same_seed_gives_the_same_files(inside, recorded, 
     same_bytes(recorded / "results", again / "results")
 
 
+@pytest.mark.long
 def test_another_seed_of_the_estimation_gives_another_result_in_the_replay_folder(inside, session_copy):
     answer = inside("session", "replay", session_copy, "--seed", 5, "--dimension", 3, "--json")
     assert answer.code == 0

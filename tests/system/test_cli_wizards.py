@@ -71,6 +71,7 @@ STEPS = {
     "joints, store": At(JOINTS, BEGUN[:1], STORE),
     "joints, replace": At(JOINTS, (), REPLACE),
 }
+LENGTHY = ("forearm, later touch", "camera, while pictures are taken", "camera, store", "fingertip, pressed")
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +152,14 @@ def test_joints_are_corrected_and_an_older_file_replaced(program: WarmProgram, m
 
 @pytest.mark.parametrize(
     ("step", "way_out"),
-    [(step, "q\n" if step.endswith("begin") else INTERRUPT) for step in STEPS],
+    [
+        pytest.param(
+            step,
+            "q\n" if step.endswith("begin") else INTERRUPT,
+            marks=[pytest.mark.long] if step in LENGTHY else [],
+        )
+        for step in STEPS
+    ],
     ids=lambda value: {INTERRUPT: "Ctrl+C", "q\n": "q"}.get(value, value),
 )
 def test_ended_at_any_step_nothing_is_stored(

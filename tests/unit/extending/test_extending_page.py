@@ -49,6 +49,7 @@ def test_the_page_has_one_example_of_each() -> None:
     assert files() == [f"{name}.py" for name in examples]
 
 
+@pytest.mark.long
 def test_a_session_with_a_policy_a_figure_a_shape_model_and_a_command(written: Written, tmp_path: Path) -> None:
     written("quickest.py")
     heaviest, circle, touches = written("heaviest.py"), written("circle.py"), written("touches.py")

@@ -66,6 +66,11 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
 
 # Whole sessions on the simulated rig, and whole surfaces.
 LENGTHY = (
+    "ablation",
+    "figure-3.12",
+    "known-shape",
+    "methods-3d",
+    "methods-6dof",
     "crash-recovery",
     "everyday-objects",
     "exploration-hand",

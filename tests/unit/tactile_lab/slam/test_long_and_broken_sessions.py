@@ -12,7 +12,7 @@ from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tests.support.simulated_contacts import registration_mm
 
 
-@pytest.mark.parametrize("shape", ["rectangle", "hexagon"])
+@pytest.mark.parametrize("shape", ["rectangle", pytest.param("hexagon", marks=pytest.mark.long)])
 def test_an_object_that_was_carried_off_is_found_again(shape: str) -> None:
     jump = Pose3(Rot3.Rz(1.0), np.array([0.1, 0.02, 0.0]))
     data = carried_off(planar_data.simulate(shape, 2, count=12), 8, jump)
@@ -35,6 +35,7 @@ def test_a_long_session_is_summed_up_and_ends_with_all_its_poses() -> None:
     assert registration_mm(data, result) < 4.0
 
 
+@pytest.mark.long
 def test_an_object_held_free_in_space_is_followed() -> None:
     data = spatial_data.simulate("box-12x6x6", 0, motion="free", motion_scale=0.5, count=8)
     motion = {"translation_m": 0.005, "rotation_rad": float(np.deg2rad(10))}

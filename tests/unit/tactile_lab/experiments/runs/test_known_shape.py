@@ -33,6 +33,6 @@ def test_less_motion_is_followed_better() -> None:
     assert followed("l-block", 0, noise=5) < 0.6 * followed("l-block", 0)
 
 
-@pytest.mark.parametrize("particles", [2_000, 40_000])
+@pytest.mark.parametrize("particles", [2_000, pytest.param(40_000, marks=pytest.mark.long)])
 def test_turns_that_no_contact_tells_do_not_count(particles: int) -> None:
     assert followed("sphere", 0, particles=particles) < 3.0
