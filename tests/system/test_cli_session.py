@@ -110,7 +110,7 @@ def test_a_replay_never_writes_over_other_files(inside, session_copy, tmp_path):
         before = {path: path.read_bytes() for path in session_copy.rglob("*") if path.is_file()}
         answer = inside("session", "replay", session_copy, "--into", folder)
         assert answer.code == 2
-        assert "--into" in answer.err
+        assert "--into" in answer.err or f"{folder} is not a folder" in answer.err
         assert before == {path: path.read_bytes() for path in session_copy.rglob("*") if path.is_file()}
     assert [path.name for path in mine.iterdir()] == ["thesis.tex"]
 

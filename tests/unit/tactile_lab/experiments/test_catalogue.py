@@ -72,6 +72,7 @@ LENGTHY = (
     "methods-3d",
     "methods-6dof",
     "crash-recovery",
+    "everyday-3d",
     "everyday-objects",
     "exploration-hand",
     "figure-3.20",
