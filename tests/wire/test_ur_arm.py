@@ -18,7 +18,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
 from drivers.emulators.ur.control_box import ControlBox, Series
 from drivers.emulators.ur.host import PlantForearm, UrHost
-from drivers.emulators.ur.rtde_server import package
+from drivers.emulators.ur.rtde_server import RtdeClient, package
 from drivers.positioner.ur.device import UrPositioner
 from drivers.positioner.ur.poses import pose_of
 from drivers.positioner.ur.process import UrProcess
@@ -147,6 +147,26 @@ def test_an_arm_of_the_cb3_series_is_moved() -> None:
         served.run_until(served.is_at(THERE), THERE)
     finally:
         served.close()
+
+
+def test_where_the_arm_stands_is_read_with_the_tool_that_was_set(
+    monkeypatch: pytest.MonkeyPatch, served: Served
+) -> None:
+    """A tool set at the pendant stands elsewhere, and on a busy machine what the arm said with it is read late."""
+    under_way: dict[RtdeClient, list[bytes]] = {}
+    tell = RtdeClient.data
+
+    def tell_late(client: RtdeClient) -> bytes:
+        if "actual_TCP_force" not in client.outputs:
+            return tell(client)
+        waiting = under_way.setdefault(client, [])
+        waiting.append(tell(client))
+        return waiting.pop(0) if len(waiting) > 150 else waiting[0]
+
+    served.box.payload_kg = 4.6
+    monkeypatch.setattr(RtdeClient, "data", tell_late)
+    served.device.connect()
+    np.testing.assert_allclose(served.device.exchange().q, HERE, atol=1e-6)
 
 
 def test_an_arm_whose_inputs_another_program_holds_is_refused(served: Served) -> None:

@@ -77,7 +77,8 @@ class RtdeClient:
 
     def __init__(self, box: Box) -> None:
         self._box, self._rest = box, b""
-        self._outputs: list[str] = []
+        self.outputs: list[str] = []
+        """Names of what it asked for."""
         self._recipes: dict[int, list[str]] = {}
         self.rate_hz = 0.0
         """Of data packages; 0 before and between ``start`` and ``pause``."""
@@ -93,7 +94,7 @@ class RtdeClient:
 
     def data(self) -> bytes:
         """One data package of the outputs as they are."""
-        body = b"\x01" + b"".join(_pack(name, self._box.output(name)) for name in self._outputs)
+        body = b"\x01" + b"".join(_pack(name, self._box.output(name)) for name in self.outputs)
         return package(_DATA, body)
 
     def _packages(self) -> Iterator[tuple[int, bytes]]:
@@ -129,8 +130,8 @@ class RtdeClient:
     def _set_outputs(self, body: bytes) -> bytes:
         (asked_hz,) = struct.unpack_from(">d", body)
         self._asked_hz = min(asked_hz, self._box.highest_Hz)
-        self._outputs = _names(body[8:])
-        return b"\x01" + ",".join(map(type_of, self._outputs)).encode()
+        self.outputs = _names(body[8:])
+        return b"\x01" + ",".join(map(type_of, self.outputs)).encode()
 
     def _set_inputs(self, body: bytes) -> bytes:
         names = _names(body)

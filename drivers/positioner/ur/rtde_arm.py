@@ -75,12 +75,18 @@ class RtdeArm:
         """
         for port, purpose in _PORTS.items():
             self._knock(port, purpose)
-        self._news = self._called("rtde_receive", "RTDEReceiveInterface", self._rate_hz, _OUTPUTS)
+        self._listen()
         self._refuse(before_program(self.state(), self.q(), self._settings))
         found = self._identity()
         self._control = self._called("rtde_control", "RTDEControlInterface", self._rate_hz)
         self._prepare()
         return f"{found}, payload {self._settings.payload_kg} kg"
+
+    def _listen(self) -> None:
+        """Hear the arm from now on: on a new connection comes nothing that was said before."""
+        if self._news is not None:
+            self._news.disconnect()
+        self._news = self._called("rtde_receive", "RTDEReceiveInterface", self._rate_hz, _OUTPUTS)
 
     @property
     def _rate_hz(self) -> float:
@@ -122,13 +128,17 @@ class RtdeArm:
                 dashboard.disconnect()
 
     def _prepare(self) -> None:
-        """Set tool, then the watchdog; what was set is read back. An arm that knows its load feels nothing at rest."""
+        """Set tool, then the watchdog; what was set is read back. An arm that knows its load feels nothing at rest.
+
+        Where it stands is heard anew once the tool is set: a place told with another tool would be taken for a jump.
+        """
         settings = self._settings
         assert settings.flange_T_forearm is not None
         self._told(self._control.setPayload, settings.payload_kg, list(settings.centre_of_gravity_m))
         self._told(self._control.setTcp, list(settings.flange_T_forearm))
         tcp = self._told(self._control.getTCPOffset)
         self._refuse(_unlike("tool centre", tcp, settings.flange_T_forearm, _SAME_PLACE))
+        self._listen()
         payload_kg = settings.payload_kg or 0.0
         self._await(lambda: abs(self._news.getPayload() - payload_kg) <= _SAME_PAYLOAD_kg)
         self._refuse(_unlike("payload", [self._news.getPayload()], [payload_kg], _SAME_PAYLOAD_kg))
