@@ -90,3 +90,23 @@ def test_a_usage_error_names_the_option(words, told, tmp_path):
 
 def test_an_unknown_experiment_is_an_error_of_ours(tmp_path):
     assert isinstance(invoke("figure-9", "--out", tmp_path).exception, ConfigurationError)
+
+
+@pytest.mark.long
+def test_a_sweep_stores_its_table_and_writes_its_page(tmp_path):
+    docs = tmp_path / "docs"
+    shutil.copytree(DOCS / "results", docs / "results")
+    few = ("--objects", "box-10x6x4", "--seeds", "1", "--dimensions", "2", "--grasps", "1", "--jobs", "1")
+    words = ["sweep", *few, "--out", str(tmp_path / "sweep"), "--store", "--docs", str(docs)]
+    answer = CliRunner().invoke(app, words)
+    assert answer.exit_code == 0
+    fresh, older = (docs / "results" / "rig-contour.md").read_text().split("## Made earlier")
+    assert "| box-10x6x4 | 2 | 1 |" in fresh
+    assert "| box-10x6x4 |" not in older
+    assert "| cube-6 |" in older
+
+
+def test_tables_of_two_dimensions_together_are_not_stored(tmp_path):
+    answer = CliRunner().invoke(app, ["sweep", "--out", str(tmp_path / "sweep"), "--store"])
+    assert answer.exit_code == 2
+    assert "--store" in answer.output
