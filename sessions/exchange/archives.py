@@ -1,15 +1,17 @@
 """A session as one ZIP file, and back.
 
-An archive's names, links and sizes are not trusted. Only regular files are extracted, only under names that a session
-has, only into a new folder, and never beyond the limits, whatever sizes the archive declares. Nothing in it is executed
-or unpickled.
+An archive's names, links and sizes are not trusted. Only regular files are extracted, only into a new folder, and never
+beyond the limits, whatever sizes the archive declares. Nothing in it is executed or unpickled. Packed by any program a
+session is found: at the top or in folders, with the files that desktops add, with folders separated as Windows does.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
 import stat
 import zipfile
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
@@ -19,10 +21,15 @@ from drivers.core.atomic_files import writing_into
 from drivers.core.errors import ConfigurationError, WriteError, given_by_a_person
 from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
 from sessions.recording.session import TRAFFIC, Session
-from sessions.recording.session_ids import check_id
+from sessions.recording.session_ids import LONGEST_ID, check_id
 
 _BLOCK_BYTES = 1 << 20
 _ADVICE = "Nothing was imported"
+_OF_DESKTOPS = {"__MACOSX", ".DS_Store", "Thumbs.db", "desktop.ini"}
+_DEEPEST = 6
+
+_Entries = dict[PurePosixPath, zipfile.ZipInfo]
+"""Files by their places."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +73,7 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
     """Unpack a session from a ZIP file into a new folder under ``root``.
 
     Args:
-        name: name of the new session; by default the name of the only folder in the archive.
+        name: name of the new session; by default that of its folder in the archive, or of the archive if it has none.
 
     Raises:
         ConfigurationError: not a ZIP file, unsafe names, links or sizes, no session in it, or a session of that name
@@ -77,8 +84,9 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
     try:
         with zipfile.ZipFile(path) as archive:
             entries = _checked_entries(archive, path, limits)
-            folder = root / check_id(name or _common_folder(entries, path), str(path))
-            return _unpack(archive, entries, folder, path, limits)
+            top = _folder_of_session(entries, path)
+            folder = root / check_id(name or _id_from(top.name or path.stem), str(path))
+            return _unpack(archive, {place.relative_to(top): entries[place] for place in entries}, folder, path, limits)
     except zipfile.BadZipFile as error:
         raise ConfigurationError(f"not a ZIP archive ({error})", where=str(path), hint=_ADVICE) from error
     except OSError as error:
@@ -87,7 +95,8 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
         ) from error
 
 
-def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits) -> list[zipfile.ZipInfo]:
+def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits) -> _Entries:
+    """The files by their places in the archive, without those that desktops add."""
     entries = [entry for entry in archive.infolist() if not entry.is_dir()]
     if len(entries) > limits.files:
         raise _refusal(path, f"contains {len(entries)} files, more than {limits.files}")
@@ -98,16 +107,20 @@ def _checked_entries(archive: zipfile.ZipFile, path: Path, limits: ArchiveLimits
     packed = sum(entry.compress_size for entry in entries)
     if total > _BLOCK_BYTES and total > limits.ratio * max(1, packed):
         raise _refusal(path, f"would unpack {packed} bytes to {total}, out of all proportion")
-    names = [entry.filename for entry in entries]
-    if len(set(names)) < len(names):
+    places = {_place(entry): entry for entry in entries}
+    if len(places) < len(entries):
         raise _refusal(path, "contains two files of the same name")
-    return entries
+    return {place: entry for place, entry in places.items() if _OF_DESKTOPS.isdisjoint(place.parts)}
+
+
+def _place(entry: zipfile.ZipInfo) -> PurePosixPath:
+    return PurePosixPath(entry.filename.replace("\\", "/"))
 
 
 def _check_entry(entry: zipfile.ZipInfo, path: Path, limits: ArchiveLimits) -> None:
-    name = entry.filename
-    parts = PurePosixPath(name).parts
-    if name.startswith("/") or "\\" in name or ":" in name or "\0" in name or ".." in parts or not 2 <= len(parts) <= 6:
+    name, place = entry.filename, _place(entry)
+    parts = place.parts
+    if place.is_absolute() or ":" in name or "\0" in name or ".." in parts or not 1 <= len(parts) <= _DEEPEST:
         raise _refusal(path, f"contains the unsafe name {name!r}")
     mode = entry.external_attr >> 16
     if mode and not stat.S_ISREG(mode) and stat.S_IFMT(mode):
@@ -118,18 +131,26 @@ def _check_entry(entry: zipfile.ZipInfo, path: Path, limits: ArchiveLimits) -> N
         raise _refusal(path, f"{name!r} would unpack to {entry.file_size} bytes, which is implausible")
 
 
-def _common_folder(entries: list[zipfile.ZipInfo], path: Path) -> str:
-    folders = {PurePosixPath(entry.filename).parts[0] for entry in entries}
-    if len(folders) != 1:
-        raise _refusal(path, f"contains {len(folders)} folders instead of one session")
-    return folders.pop()
+def _id_from(name: str) -> str:
+    """The session id nearest to a name of a folder or file."""
+    return re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-")[:LONGEST_ID]
 
 
-def _unpack(
-    archive: zipfile.ZipFile, entries: list[zipfile.ZipInfo], folder: Path, path: Path, limits: ArchiveLimits
-) -> Session:
-    if len({PurePosixPath(entry.filename).parts[0] for entry in entries}) != 1:
-        raise _refusal(path, "does not contain exactly one session")
+def _folder_of_session(entries: Iterable[PurePosixPath], path: Path) -> PurePosixPath:
+    """The folder in the archive that is the session; the top of an archive is a folder, too."""
+    found = sorted({place.parent for place in entries if place.name == MANIFEST}, key=lambda folder: len(folder.parts))
+    found = [folder for folder in found if folder == found[0] or found[0] not in folder.parents]
+    if not found:
+        raise _refusal(path, f"contains no session (a folder with {MANIFEST} and {TRAFFIC})")
+    if len(found) > 1:
+        raise _refusal(path, f"contains {len(found)} sessions ({', '.join(map(str, found[:3]))}), not one")
+    beside = [place for place in entries if found[0] not in place.parents]
+    if beside:
+        raise _refusal(path, f"contains {len(beside)} files beside the session {found[0]}, such as {beside[0]}")
+    return found[0]
+
+
+def _unpack(archive: zipfile.ZipFile, entries: _Entries, folder: Path, path: Path, limits: ArchiveLimits) -> Session:
     try:
         folder.mkdir(parents=True)
     except FileExistsError as error:
@@ -137,8 +158,8 @@ def _unpack(
         raise ConfigurationError("a session of that name exists already", where=str(folder), hint=hint) from error
     try:
         left = limits.total_bytes
-        for entry in entries:
-            target = folder.joinpath(*PurePosixPath(entry.filename).parts[1:])
+        for place, entry in entries.items():
+            target = folder / place
             with writing_into(folder):
                 target.parent.mkdir(parents=True, exist_ok=True)
             with archive.open(entry) as source, writing_into(folder), target.open("xb") as out:

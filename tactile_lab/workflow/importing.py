@@ -14,6 +14,8 @@ from sessions.exchange.timed_contacts import ImportSettings, read_timed_contacts
 from sessions.recording.session import Session
 from tactile_lab.evaluation.files.mesh_io import read_mesh
 
+_OTHER_ARCHIVES = {".tar", ".tgz", ".gz", ".bz2", ".xz", ".zst", ".7z", ".rar"}
+
 
 def import_session(archive: Path, root: Path, name: str | None = None) -> Session:
     """Import a session from a ZIP archive. Raises as :func:`sessions.exchange.archives.import_archive`."""
@@ -28,6 +30,9 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
             cannot be used, or the log exists already; nothing is left then.
         WriteError: a file cannot be written.
     """
+    if file.suffix.lower() in _OTHER_ARCHIVES:
+        hint = "Unpack it: the folder of a session is used as it is"
+        raise ConfigurationError("is an archive, but no ZIP", where=str(file), hint=hint)
     if log.exists():
         raise ConfigurationError("exists already", where=str(log), hint="Choose another name with --out")
     if mesh is not None:

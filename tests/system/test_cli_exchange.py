@@ -258,7 +258,7 @@ def test_an_archive_becomes_a_session_that_lists_and_shows(inside, packed, tmp_p
         ("/tmp/evil.txt", b"evil", "unsafe name"),
         ("s/calibration/joints.yaml", b"# another\n", "contains two files of the same name"),
         ("s/zeros", bytes(20_000_000), "which is implausible"),
-        ("t/session.yaml", b"", "2 folders"),
+        ("t/session.yaml", b"", "contains 2 sessions"),
     ],
 )
 def test_an_archive_that_can_not_be_trusted_leaves_nothing_behind(inside, packed, tmp_path, name, content, words):
@@ -277,6 +277,8 @@ def test_what_is_no_archive_or_a_torn_one_is_told(inside, packed, tmp_path):
     for name in ("torn.zip", "empty.zip"):
         refused(inside("session", "import", tmp_path / name, "--root", tmp_path / "runs"), 2, name, "not a ZIP archive")
     refused(inside("session", "import", tmp_path / "none.zip", "--root", tmp_path / "runs"), 2, "No such file")
+    (tmp_path / "s.tar.gz").write_bytes(b"\x1f\x8b")
+    refused(inside("session", "import", tmp_path / "s.tar.gz"), 2, "is an archive, but no ZIP", "Unpack it")
     assert not (tmp_path / "runs").exists()
 
 

@@ -32,13 +32,13 @@ def archive_of(path, files):
     return path
 
 
+def files_of(session):
+    files = (item for item in session.folder.rglob("*") if item.is_file())
+    return {f"s/{item.relative_to(session.folder).as_posix()}": item.read_bytes() for item in files}
+
+
 def repacked(session, path, changes):
-    files = {
-        f"s/{item.relative_to(session.folder).as_posix()}": item.read_bytes()
-        for item in session.folder.rglob("*")
-        if item.is_file()
-    }
-    return archive_of(path, {**files, **changes})
+    return archive_of(path, {**files_of(session), **changes})
 
 
 def test_a_session_comes_back_out_of_its_archive(session, tmp_path):
@@ -55,8 +55,35 @@ def test_a_session_comes_back_out_of_its_archive(session, tmp_path):
         export_archive(session, tmp_path / "s.zip")
 
 
+def of_a_mac(files):
+    return {**files, "__MACOSX/s/._session.yaml": b"x", "s/.DS_Store": b"x", ".DS_Store": b"x"}
+
+
+def without_a_folder(files):
+    return {name.removeprefix("s/"): content for name, content in files.items()}
+
+
+def in_folders(files):
+    return {f"downloads/new/{name}": content for name, content in files.items()}
+
+
+def of_windows(files):
+    return {name.replace("/", "\\"): content for name, content in files.items()}
+
+
 @pytest.mark.parametrize(
-    "name", ["../evil.txt", "s/../../evil.txt", "/etc/evil", "C:/evil", "s\\..\\evil", "s/a/b/c/d/e/f/evil", "evil"]
+    ("pack", "name"), [(of_a_mac, "s"), (without_a_folder, "mine-2"), (in_folders, "s"), (of_windows, "s")]
+)
+def test_a_session_is_found_however_it_was_packed(session, tmp_path, pack, name):
+    files = files_of(session)
+    found = import_archive(archive_of(tmp_path / "Mine (2).zip", pack(files)), tmp_path / "in")
+    assert found.manifest.name == name
+    held = {item.relative_to(found.folder).as_posix() for item in found.folder.rglob("*") if item.is_file()}
+    assert held == {file.removeprefix("s/") for file in files}
+
+
+@pytest.mark.parametrize(
+    "name", ["../evil.txt", "s/../../evil.txt", "/etc/evil", "C:/evil", "s\\..\\evil", "//s/evil", "s/a/b/c/d/e/f/evil"]
 )
 def test_unsafe_names_are_refused_and_nothing_is_left(session, tmp_path, name):
     path = repacked(session, tmp_path / "bad.zip", {name: "evil"})
@@ -91,7 +118,8 @@ def test_sizes_are_bounded(session, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"other/session.yaml": ""}, "2 folders"),
+        ({"other/session.yaml": ""}, r"2 sessions \(s, other\), not one"),
+        ({"other/notes.txt": ""}, r"1 files beside the session s, such as other/notes\.txt"),
         ({"s/session.yaml": "colour: red\n"}, "unknown key"),
         ({"s/calibration/joints.yaml": "a: 2\n"}, "changed since the recording"),
         ({"s/traffic.mcap": b"hello"}, "not an MCAP file"),
@@ -128,7 +156,7 @@ def test_what_is_no_archive_is_told(tmp_path):
         import_archive(tmp_path / "a.zip", tmp_path)
     with pytest.raises(ConfigurationError, match="No such file"):
         import_archive(tmp_path / "none.zip", tmp_path)
-    with pytest.raises(ConfigurationError, match="contains 0 folders"):
+    with pytest.raises(ConfigurationError, match="contains no session"):
         import_archive(archive_of(tmp_path / "empty.zip", {}), tmp_path)
 
 
