@@ -7,7 +7,6 @@ session is found: at the top or in folders, with the files that desktops add, wi
 
 from __future__ import annotations
 
-import re
 import shutil
 import stat
 import zipfile
@@ -18,10 +17,10 @@ from pathlib import Path, PurePosixPath
 from typing import BinaryIO
 
 from drivers.core.atomic_files import writing_into
-from drivers.core.errors import ConfigurationError, WriteError, given_by_a_person
+from drivers.core.errors import ConfigurationError, SessionDataError, WriteError, given_by_a_person
 from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
 from sessions.recording.session import TRAFFIC, Session
-from sessions.recording.session_ids import LONGEST_ID, check_id
+from sessions.recording.session_ids import LONGEST_ID, check_id, slug
 
 _BLOCK_BYTES = 1 << 20
 _ADVICE = "Nothing was imported"
@@ -85,7 +84,7 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
         with zipfile.ZipFile(path) as archive:
             entries = _checked_entries(archive, path, limits)
             top = _folder_of_session(entries, path)
-            folder = root / check_id(name or _id_from(top.name or path.stem), str(path))
+            folder = root / check_id(name or slug(top.name or path.stem)[:LONGEST_ID], str(path))
             return _unpack(archive, {place.relative_to(top): entries[place] for place in entries}, folder, path, limits)
     except zipfile.BadZipFile as error:
         raise ConfigurationError(f"not a ZIP archive ({error})", where=str(path), hint=_ADVICE) from error
@@ -131,14 +130,11 @@ def _check_entry(entry: zipfile.ZipInfo, path: Path, limits: ArchiveLimits) -> N
         raise _refusal(path, f"{name!r} would unpack to {entry.file_size} bytes, which is implausible")
 
 
-def _id_from(name: str) -> str:
-    """The session id nearest to a name of a folder or file."""
-    return re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-")[:LONGEST_ID]
-
-
 def _folder_of_session(entries: Iterable[PurePosixPath], path: Path) -> PurePosixPath:
     """The folder in the archive that is the session; the top of an archive is a folder, too."""
-    found = sorted({place.parent for place in entries if place.name == MANIFEST}, key=lambda folder: len(folder.parts))
+    found = sorted(
+        {place.parent for place in entries if place.name == MANIFEST}, key=lambda folder: (len(folder.parts), folder)
+    )
     found = [folder for folder in found if folder == found[0] or found[0] not in folder.parents]
     if not found:
         raise _refusal(path, f"contains no session (a folder with {MANIFEST} and {TRAFFIC})")
@@ -188,12 +184,19 @@ def _as_session(folder: Path, path: Path) -> Session:
         raise _refusal(path, f"contains no session (a folder with {MANIFEST} and {TRAFFIC})")
     manifest = read_manifest(folder)
     session = Session(folder, manifest)
-    for role in manifest.calibration:
-        session.calibration_file(role)  # its hash
+    _check_calibration(session, path)
     session.traffic()
     changes = {"name": folder.name, "derived": manifest.derivation("import", path.name)}
     write_manifest(folder, manifest.model_copy(update=changes))
     return Session.open(folder)
+
+
+def _check_calibration(session: Session, path: Path) -> None:
+    try:
+        for role in session.manifest.calibration:
+            session.calibration_file(role)
+    except SessionDataError as error:
+        raise _refusal(path, f"{Path(error.where).name} in it {error.what}") from error
 
 
 def _refusal(path: Path, what: str) -> ConfigurationError:

@@ -17,7 +17,7 @@ from drivers.core.atomic_files import write_whole, writing_into
 from drivers.core.clock import NANOSECONDS
 from drivers.core.errors import SessionDataError, SessionError
 from sessions.recording.manifest import MANIFEST, Manifest, manifest_from, read_manifest, write_manifest
-from sessions.recording.session import CALIBRATION, RESULTS, TRAFFIC, TRAJECTORY, new_folder
+from sessions.recording.session import CALIBRATION, RESULTS, TRAFFIC, TRAJECTORY, Session, new_folder
 from sessions.recording.session_ids import recovered_id
 from sessions.recording.traffic.disk import being_written
 from sessions.recording.traffic.reader import Loss, TrafficMessage, TrafficReader
@@ -86,7 +86,8 @@ def recover(source: Path, root: Path | None = None) -> Recovery:
         raise SessionDataError("is being recorded", where=str(source), hint="Wait until the session has ended")
     reader = TrafficReader(source / TRAFFIC)
     manifest = _manifest(source, reader)
-    if manifest.status not in ("open", "failed") and not _read_through(reader):
+    sound = manifest.status not in ("open", "failed") and Session(source, manifest).is_calibrated_as_recorded()
+    if sound and not _read_through(reader):
         return Recovery(source, None, {}, reader.loss)
     folder = new_folder(root or source.parent, recovered_id(source.name))
     try:
@@ -126,7 +127,7 @@ def _read_through(reader: TrafficReader) -> bool:
 
 
 def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
-    """Copy everything but recording, manifest and results; missing calibrations come from the recording."""
+    """Copy everything but recording, manifest and results; calibrations come from the recording."""
     for item in sorted(source.iterdir()):
         if item.is_symlink() or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
             continue
@@ -138,7 +139,7 @@ def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
     (folder / CALIBRATION).mkdir(exist_ok=True)
     for attachment in reader.attachments():
         kept, _, name = attachment.name.rpartition("/")
-        if kept == CALIBRATION and not (folder / CALIBRATION / name).exists():
+        if kept == CALIBRATION:
             write_whole(folder / CALIBRATION / name, attachment.data)
 
 

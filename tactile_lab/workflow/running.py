@@ -18,7 +18,7 @@ from sessions.conductor.progress import Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.recording.manifest import Status
 from sessions.recording.recorder import Level
-from sessions.recording.session import RunningSession, create_session
+from sessions.recording.running_session import RunningSession, create_session
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.rigs.build import check_calibration

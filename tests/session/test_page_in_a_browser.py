@@ -11,7 +11,7 @@ import pytest
 
 from sessions.guided.operator import Ask, Request
 from sessions.recording.recorder import Level
-from sessions.recording.session import create_session
+from sessions.recording.running_session import create_session
 from sessions.recording.traffic import schemas
 from tactile_lab.view.feed import ViewFeed
 from tests.support.browser import Browser, chromium, until

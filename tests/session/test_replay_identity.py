@@ -24,7 +24,7 @@ from sessions.perception.event_outcomes import TruthFrame
 from sessions.perception.interpreter import Interpreter, Observer, fingertip_link
 from sessions.perception.perception import Perception
 from sessions.perception.replay import Replay
-from sessions.recording.session import create_session
+from sessions.recording.running_session import create_session
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from sessions.rig_runtime.sensor_stream import SensorStream
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sessions.recording.session import Session, create_session
+from sessions.recording.running_session import create_session
+from sessions.recording.session import Session
 
 
 def short_session(root: Path) -> Session:

@@ -13,7 +13,8 @@ from drivers.emulators.ethercat.shadow_chain import ChainSettings
 from drivers.shadow.device.hand_process import HandProcess
 from sessions.perception.interpreter import Interpreter, Observer
 from sessions.perception.replay import Replay
-from sessions.recording.session import Session, create_session
+from sessions.recording.running_session import create_session
+from sessions.recording.session import Session
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
 from tactile_lab.rigs.laboratory import open_laboratory

@@ -25,7 +25,7 @@ from drivers.core.contacts import FINGERS
 from drivers.core.errors import TactileLabError
 from sessions.recording.device_stamps import rdt_stamp
 from sessions.recording.recorder import NullTraffic, Recorder, TrafficSink
-from sessions.recording.session import create_session
+from sessions.recording.running_session import create_session
 from sessions.recording.traffic.disk import CutBackFile
 from sessions.recording.traffic.settings import TrafficSettings
 

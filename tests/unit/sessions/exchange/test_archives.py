@@ -12,7 +12,7 @@ import pytest
 from drivers.core.errors import ConfigurationError, WriteError
 from sessions.exchange import archives
 from sessions.exchange.archives import ArchiveLimits, export_archive, import_archive
-from sessions.recording.session import create_session
+from sessions.recording.running_session import create_session
 
 
 @pytest.fixture
@@ -118,7 +118,7 @@ def test_sizes_are_bounded(session, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"other/session.yaml": ""}, r"2 sessions \(s, other\), not one"),
+        ({"other/session.yaml": ""}, r"2 sessions \(other, s\), not one"),
         ({"other/notes.txt": ""}, r"1 files beside the session s, such as other/notes\.txt"),
         ({"s/session.yaml": "colour: red\n"}, "unknown key"),
         ({"s/calibration/joints.yaml": "a: 2\n"}, "changed since the recording"),

@@ -8,7 +8,8 @@ import pytest
 
 from drivers.core.errors import ConfigurationError
 from sessions.exchange.extracting import Piece, extract
-from sessions.recording.session import TRAFFIC, Session, create_session
+from sessions.recording.running_session import create_session
+from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.traffic.reader import TrafficReader
 
 SECOND_ns = 1_000_000_000

@@ -9,7 +9,7 @@ from drivers.core.errors import SessionError
 from sessions.perception.event_outcomes import TareReport, TruthFrame
 from sessions.perception.replay import Replay
 from sessions.recording.recorder import Recorder
-from sessions.recording.session import create_session
+from sessions.recording.running_session import create_session
 from sessions.recording.traffic.reader import TrafficReader
 from sessions.recording.traffic.writer import TrafficWriter
 from tests.support.session_fakes import make_interpreter, make_rig, play_session, same_grasp

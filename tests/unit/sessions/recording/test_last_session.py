@@ -13,7 +13,7 @@ from sessions.exchange.extracting import Piece, extract
 from sessions.recording.listing import find_session, list_sessions
 from sessions.recording.manifest import read_manifest
 from sessions.recording.recovery import recover
-from sessions.recording.session import create_session
+from sessions.recording.running_session import create_session
 
 
 def recorded(root, minute, object_name="box"):

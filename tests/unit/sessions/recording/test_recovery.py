@@ -12,7 +12,8 @@ from sessions.recording import recovery
 from sessions.recording.listing import left_open, list_sessions, summarize
 from sessions.recording.manifest import read_manifest
 from sessions.recording.recovery import recover
-from sessions.recording.session import Session, create_session
+from sessions.recording.running_session import create_session
+from sessions.recording.session import Session
 from sessions.recording.traffic.settings import TrafficSettings
 
 START = datetime(2026, 11, 21, 9, 30, 0, tzinfo=UTC)
@@ -113,6 +114,19 @@ def test_a_description_that_was_spoilt_comes_back_from_the_recording(tmp_path):
     recovery = recover(folder)
     assert read_manifest(recovery.folder).object_name == "box"
     assert Session.open(recovery.folder).calibration_file("joints").read_text() == "a: 1\n"
+
+
+@pytest.mark.parametrize("damage", [lambda file: file.unlink(), lambda file: file.write_text("a: 2\n")])
+def test_calibrations_of_a_whole_session_come_back_from_its_recording(tmp_path, damage):
+    joints = tmp_path / "joints.yaml"
+    joints.write_text("a: 1\n")
+    folder = record(tmp_path / "runs", calibration=joints)
+    damage(folder / "calibration" / "joints.yaml")
+    with pytest.raises(SessionError, match=r"session recover .* takes it from the recording"):
+        Session.open(folder).calibration_file("joints")
+    recovery = recover(folder)
+    assert Session.open(recovery.folder).calibration_file("joints").read_text() == "a: 1\n"
+    assert not recovery.lossy
 
 
 def test_several_files_are_recovered_as_one_recording(tmp_path):

@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from drivers.core.errors import ConfigurationError, SessionError
 from sessions.recording.listing import find_session, list_sessions, summarize
 from sessions.recording.manifest import Manifest, read_manifest, write_manifest
-from sessions.recording.session import Session, create_session
+from sessions.recording.running_session import create_session
+from sessions.recording.session import Session
 from sessions.recording.traffic import disk as traffic_disk
 from sessions.recording.traffic.writer import TrafficWriter
 

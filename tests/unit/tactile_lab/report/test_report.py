@@ -15,7 +15,8 @@ import pytest
 import trimesh
 
 from drivers.core.errors import SessionError
-from sessions.recording.session import Session, create_session
+from sessions.recording.running_session import create_session
+from sessions.recording.session import Session
 from sessions.recording.traffic.reader import may_hold
 from tactile_lab import report
 from tactile_lab.colours import UNKNOWN, hex_colour, viridis

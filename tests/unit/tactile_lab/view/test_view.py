@@ -27,7 +27,7 @@ from drivers.core.errors import ConfigurationError, DeviceError
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal
 from sessions.guided.operator import Ask
 from sessions.recording.recorder import Level, Recorder
-from sessions.recording.session import create_session
+from sessions.recording.running_session import create_session
 from sessions.recording.traffic import schemas
 from tactile_lab import process_feed
 from tactile_lab.cli.running.page_address import PageAddress
