@@ -29,7 +29,7 @@ from pathlib import Path
 from typing import Self
 
 from drivers.core.errors import TactileLabError
-from sessions.recording import session as session_files
+from sessions.recording import running_session as session_files
 from sessions.recording.session import Session
 from sessions.recording.traffic import disk
 from tactile_lab.benchmarks.start_times import has_messages
