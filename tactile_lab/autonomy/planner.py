@@ -90,7 +90,10 @@ class Planner:
         self._box: BoundingBox | None = None
         self._reach, self._touches = reach or SideReach(), touches
         self._standing: StandingPlanner | None = None
-        """Plans where the palm does not pass over the object: from here on that is left where it stands."""
+        """Plans where the palm does not pass over the object: that is left where it stands."""
+
+        self._for_once = False
+        """Whether it plans only one grasp or touch of an object that is else grasped from above."""
 
         self._blocked, self._standstill = 0, Standstill()
         self.exhausted = ""
@@ -116,10 +119,8 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, one grasp follows the
         contacts alone.
         """
-        if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
-            self._standing = self._standing_planner()
-        if self._standing is not None:
-            return self._standing_plan(index, self._standing)
+        if (beside := self._beside(index)) is not None:
+            return beside
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
         if self._standstill.is_reached and (touch := self._standing_planner().touch()) is not None:
             self._standstill = Standstill()
@@ -130,10 +131,24 @@ class Planner:
         self._by_estimate = chosen is not None
         return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
 
-    def _standing_plan(self, index: int, standing: StandingPlanner) -> GraspPlan:
-        plan = standing.plan()
-        self.exhausted = "" if plan is not None else standing.exhausted
+    def _beside(self, index: int) -> GraspPlan | None:
+        """A plan for what is too tall for the palm to pass over, or for what blocked the way down; None for the rest.
+
+        What blocked the way down is tried from above again after one capture beside it, or where there is none.
+        """
+        if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
+            self._standing, self._for_once = self._standing_planner(), True
+        if self._standing is None:
+            return None
+        plan = self._standing.plan()
+        if plan is None and self._for_once:
+            self._return_above()
+            return None
+        self.exhausted = "" if plan is not None else self._standing.exhausted
         return plan or self._rule.plan(index)
+
+    def _return_above(self) -> None:
+        self._standing, self._for_once, self._blocked = None, False, 0
 
     def _standing_planner(self, box: BoundingBox | None = None) -> StandingPlanner:
         """For the object as it was felt; without a box by the contacts of the estimate."""
@@ -156,7 +171,7 @@ class Planner:
         """Another plan for the same grasp, after a person has vetoed the last one."""
         if self._standing is not None:
             self._standing.on_blocked()
-            return self._standing_plan(index, self._standing)
+            return self._beside(index) or self._rule.plan(index)
         if self.choice is None or self.choice.decision.chosen is None:
             plan = replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
             return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
@@ -255,6 +270,8 @@ class Planner:
             self._standing.on_grasp(grasp)
             self._rule.centre_m = self._standing.middle_m
         if self._standing is not None or plan.only_touch:
+            if self._for_once:
+                self._return_above()
             self._hand_motion, self._here = Pose3(), plan.frame
             return Reorientation(0.0, np.zeros(2))
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY

@@ -12,6 +12,7 @@ from gtsam import Pose2, Pose3, Rot3
 from drivers.core.contacts import FINGERS, Array, Contact, Grasp
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
+from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
@@ -125,9 +126,10 @@ class KnownSlam:
     origin_height_m: float = 0.022
 
 
-def planner(slam: KnownSlam, fixed_grasps: int = 1) -> Planner:
+def planner(slam: KnownSlam, fixed_grasps: int = 1, dimension: int = 2) -> Planner:
     rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0))
-    return Planner(slam, rule, SETTINGS, fixed_grasps, HandShape(), dimension=2)  # type: ignore[arg-type]
+    touches = TouchSettings() if dimension == 3 else None
+    return Planner(slam, rule, SETTINGS, fixed_grasps, HandShape(), dimension, touches=touches)  # type: ignore[arg-type]
 
 
 def known_slam(x: float = 0.0, y: float = 0.0) -> KnownSlam:
@@ -185,6 +187,36 @@ def test_landings_are_forgotten_when_the_object_was_moved_and_no_sooner() -> Non
     assert np.linalg.norm(open_tips_m(chooser.plan(1)) - open_tips_m(first), axis=1).max() > 0.01
     chooser.on_carry(Pose3(Rot3(), np.array([1e-6, 0.0, 0.0])))
     np.testing.assert_allclose(open_tips_m(chooser.plan(1)), open_tips_m(first), atol=1e-5)
+
+
+FROM_ABOVE = {"alternating yaw", "a yaw with room for the hand"}
+
+
+def block_the_way_down(chooser: Planner) -> None:
+    for _ in range(2):
+        plan = chooser.plan(4)
+        assert plan.reason in FROM_ABOVE
+        chooser.on_landings([open_tips_m(plan)[0]])
+
+
+def test_what_blocked_the_way_down_is_touched_once_and_then_grasped_from_above_again() -> None:
+    chooser = planner(KnownSlam(None), dimension=3)
+    block_the_way_down(chooser)
+    beside = chooser.plan(4)
+    assert beside.reason not in FROM_ABOVE
+    chooser.on_grasp(grasp_at("FF"), beside)
+    assert chooser.plan(5).reason in FROM_ABOVE
+
+
+def test_a_session_goes_on_from_above_when_nothing_beside_the_object_is_left() -> None:
+    chooser = planner(KnownSlam(None), dimension=3)
+    block_the_way_down(chooser)
+    for _ in range(200):
+        if (plan := chooser.plan(4)).reason in FROM_ABOVE:
+            break
+        chooser.on_landings([plan.frame.pose.translation()])
+    assert plan.reason in FROM_ABOVE
+    assert not chooser.exhausted
 
 
 def test_estimate_that_missed_the_object_is_doubted_for_one_grasp() -> None:
