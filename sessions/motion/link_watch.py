@@ -12,12 +12,13 @@ import numpy as np
 
 from drivers.core.contacts import Array
 
-_FIRST_READINGS = 25
-"""Of a motion: it starts with a jerk."""
+_JERK_ns = 250_000_000
+"""A motion starts with a jerk, as long on every rig: readings until then are not judged."""
 
 _SIGMAS, _LEAST_COUNTS = 8.0, 250.0
 _READINGS = 2
-"""In a row: a lone one is no touch. A positioner that gets a target late jerks, and the wrist with it."""
+"""In a row: a lone one is no touch. A positioner that gets a target late jerks, and the wrist with it. A motor is read
+more rarely than the hand answers: a value that comes again is the same reading."""
 
 
 class LinkWatch:
@@ -28,8 +29,9 @@ class LinkWatch:
 
     def restart(self) -> None:
         """A new even motion begins."""
-        self._seen, self._suspicious = 0, 0
-        self._stamp_ns: int | None = None
+        self._learned, self._suspicious = 0, 0
+        self._began_ns: int | None = None
+        self._newest: tuple[int, Array] | None = None
         self._mean: Array | None = None
         self._squares: Array | None = None
 
@@ -40,18 +42,21 @@ class LinkWatch:
             torques: counts of all motors, shape (20,), None where the hand tells none.
             stamp_ns: when it arrived. A reading that was judged before is not a second one that says so.
         """
-        if torques is None or stamp_ns == self._stamp_ns:
+        if torques is None or stamp_ns is None or (self._newest is not None and stamp_ns == self._newest[0]):
             return self._suspicious >= _READINGS
-        self._stamp_ns = stamp_ns
-        self._seen += 1
-        if self._seen <= _FIRST_READINGS:
+        before = torques if self._newest is None else self._newest[1]
+        self._newest = stamp_ns, torques
+        if self._began_ns is None:
+            self._began_ns = stamp_ns
+        if stamp_ns - self._began_ns < _JERK_ns:
             return False
         if self._mean is None or self._squares is None:
             self._mean, self._squares = torques.astype(float), np.zeros(len(torques))
             return False
         off = np.abs(torques - self._mean)
-        if bool((off > np.maximum(_LEAST_COUNTS, _SIGMAS * self._sigma())).any()):
-            self._suspicious += 1
+        far = off > np.maximum(_LEAST_COUNTS, _SIGMAS * self._sigma())
+        if far.any():
+            self._suspicious += bool((torques != before)[far].any())
             return self._suspicious >= _READINGS
         self._suspicious = 0
         self._learn(torques)
@@ -59,11 +64,12 @@ class LinkWatch:
 
     def _sigma(self) -> Array:
         assert self._squares is not None
-        return np.asarray(np.sqrt(self._squares / max(1, self._seen - _FIRST_READINGS - 1)))
+        return np.asarray(np.sqrt(self._squares / max(1, self._learned)))
 
     def _learn(self, torques: Array) -> None:
         assert self._mean is not None
         assert self._squares is not None
+        self._learned += 1
         before = torques - self._mean
-        self._mean = self._mean + before / (self._seen - _FIRST_READINGS)
+        self._mean = self._mean + before / (self._learned + 1)
         self._squares = self._squares + before * (torques - self._mean)

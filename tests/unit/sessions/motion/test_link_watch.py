@@ -6,6 +6,8 @@ import numpy as np
 
 from sessions.motion.link_watch import LinkWatch
 
+CYCLE_ns = 10_000_000
+
 
 def counts(rng: np.random.Generator, pushed: float = 0.0) -> np.ndarray:
     torques = 300.0 + 10.0 * rng.standard_normal(20)
@@ -16,7 +18,7 @@ def counts(rng: np.random.Generator, pushed: float = 0.0) -> np.ndarray:
 def cycles_until_touched(pushed: float, begins: int, cycles: int = 400) -> int | None:
     rng, watch = np.random.default_rng(0), LinkWatch()
     for cycle in range(cycles):
-        if watch.is_touched(counts(rng, pushed if cycle >= begins else 0.0), cycle):
+        if watch.is_touched(counts(rng, pushed if cycle >= begins else 0.0), cycle * CYCLE_ns):
             return cycle
     return None
 
@@ -32,30 +34,50 @@ def test_a_push_is_told_in_its_second_reading() -> None:
 def test_a_lone_jerk_and_the_jerk_of_starting_are_no_touch() -> None:
     rng, watch = np.random.default_rng(0), LinkWatch()
     pushes = [900.0 if cycle < 20 or cycle == 100 else 0.0 for cycle in range(200)]
-    assert not any(watch.is_touched(counts(rng, push), stamp) for stamp, push in enumerate(pushes))
+    assert not any(watch.is_touched(counts(rng, push), stamp * CYCLE_ns) for stamp, push in enumerate(pushes))
 
 
 def test_a_lone_jerk_that_is_looked_at_twice_is_no_touch() -> None:
     """A hand whose statuses come more rarely than the session looks at them."""
     rng, watch = np.random.default_rng(0), LinkWatch()
     readings = [counts(rng, 900.0 if number == 100 else 0.0) for number in range(200)]
-    assert not any(watch.is_touched(reading, stamp) for stamp, reading in enumerate(readings) for _ in range(2))
+    assert not any(
+        watch.is_touched(reading, stamp * CYCLE_ns) for stamp, reading in enumerate(readings) for _ in range(2)
+    )
+
+
+def test_a_lone_jerk_that_comes_in_two_answers_is_no_touch() -> None:
+    """A hand that is heard twice for every reading of a motor."""
+    rng, watch = np.random.default_rng(0), LinkWatch()
+    readings = [counts(rng, 900.0 if number == 200 else 0.0) for number in range(400)]
+    assert not any(watch.is_touched(readings[cycle // 2], cycle * CYCLE_ns // 5) for cycle in range(800))
+
+
+def test_a_motion_starts_with_a_jerk_that_takes_as_long_however_often_the_hand_is_heard() -> None:
+    for cycle_ns in (CYCLE_ns, CYCLE_ns // 10):
+        rng, watch = np.random.default_rng(0), LinkWatch()
+        jerk = 240_000_000 // cycle_ns
+        pushes = [900.0 if cycle < jerk else 0.0 for cycle in range(4 * jerk)]
+        assert not any(watch.is_touched(counts(rng, push), cycle * cycle_ns) for cycle, push in enumerate(pushes))
 
 
 def test_a_touch_stays_one_until_something_else_is_heard() -> None:
     rng, watch = np.random.default_rng(0), LinkWatch()
-    told = [watch.is_touched(counts(rng, 900.0 if stamp >= 100 else 0.0), min(stamp, 101)) for stamp in range(110)]
+    told = [
+        watch.is_touched(counts(rng, 900.0 if stamp >= 100 else 0.0), min(stamp, 101) * CYCLE_ns)
+        for stamp in range(110)
+    ]
     assert not any(told[:101])
     assert all(told[101:])
 
 
 def test_a_new_motion_is_compared_with_itself() -> None:
     rng, watch = np.random.default_rng(0), LinkWatch()
-    assert not any(watch.is_touched(counts(rng), stamp) for stamp in range(100))
+    assert not any(watch.is_touched(counts(rng), stamp * CYCLE_ns) for stamp in range(100))
     watch.restart()
-    assert not any(watch.is_touched(counts(rng, 900.0), 100 + stamp) for stamp in range(100))
+    assert not any(watch.is_touched(counts(rng, 900.0), (100 + stamp) * CYCLE_ns) for stamp in range(100))
 
 
 def test_a_hand_without_strain_gauges_tells_nothing() -> None:
     watch = LinkWatch()
-    assert not any(watch.is_touched(None, stamp) for stamp in range(50))
+    assert not any(watch.is_touched(None, stamp * CYCLE_ns) for stamp in range(50))

@@ -1,0 +1,61 @@
+"""The installed command in a folder full of Python files named like our packages and what they need."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tactile_lab.rigs.description import shipped_rigs
+
+NAMES = (
+    *("drivers", "sessions", "calibration", "tactile_lab", "tests"),
+    *(
+        "numpy",
+        "scipy",
+        "cv2",
+        "gtsam",
+        "yaml",
+        "typer",
+        "click",
+        "rich",
+        "can",
+        "serial",
+        "mcap",
+        "mujoco",
+        "pydantic",
+    ),
+    *("rtde_control", "rtde_receive", "dashboard_client", "pysoem", "threadpoolctl", "trimesh", "websockets", "mcap"),
+    *("json", "logging", "typing", "random", "types", "queue", "socket", "signal", "select", "struct", "platform"),
+)
+
+
+@pytest.fixture
+def foreign_folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "work"
+    folder.mkdir()
+    for name in NAMES:
+        (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'a').write(__name__)\n")
+    return folder
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("real_time_alone")
+@pytest.mark.parametrize("rig", sorted(shipped_rigs()))
+def test_every_rig_runs_and_nothing_of_the_folder_is_executed(foreign_folder: Path, rig: str) -> None:
+    command = [str(Path(sys.executable).with_name("tactile-lab")), "run", "--rig", rig, "--grasps", "1", "--seed", "1"]
+    done = subprocess.run(
+        command,
+        cwd=foreign_folder,
+        env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    assert done.returncode in (0, 3), done.stderr  # 3: on a busy machine messages come late
+    assert "Traceback" not in done.stderr
+    assert not (foreign_folder.parent / "executed").exists()
