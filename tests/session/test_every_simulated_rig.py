@@ -10,7 +10,6 @@ from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending
 from tactile_lab.workflow.running import SessionRequest, run_session
 
-
 FIRST = ("sim-biotac", 5)
 OTHERS = (("sim-left", 5), ("sim-lite", 4))
 
