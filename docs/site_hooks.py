@@ -6,6 +6,7 @@ import ast
 import posixpath
 import re
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 from mkdocs.structure.files import File, Files
@@ -13,6 +14,11 @@ from mkdocs.structure.files import File, Files
 REPOSITORY = Path(__file__).resolve().parents[1]
 _BESIDE = {"README.md": "index.md", "CONTRIBUTING.md": "CONTRIBUTING.md", "CHANGELOG.md": "CHANGELOG.md"}
 """Pages beside the folder of documents, and what they are called on the site."""
+
+_EXPERIMENTS = REPOSITORY / "tactile_lab" / "experiments"
+_SOURCES = run_path(str(_EXPERIMENTS / "execution" / "source_version.py"))["version"]()
+_AGES = run_path(str(_EXPERIMENTS / "results" / "page_ages.py"))
+"""Both need nothing but Python: the site is made without the packages' requirements."""
 
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s#:]+)(#[^)\s]*)?\)")
 _ROLE = re.compile(r":(?:class|func|meth|mod|data|attr|exc):(?=<code>|`)")
@@ -28,7 +34,10 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str:
-    """Links to files that the site does not have, such as code, become their text: it names the file already."""
+    """Links to files that the site does not have, such as code, become their text: it names the file already.
+
+    Results say whether they are older than the code that the site is made of.
+    """
     folder = posixpath.dirname(page.file.src_uri)
 
     def rewritten(link: re.Match[str]) -> str:
@@ -40,6 +49,8 @@ def on_page_markdown(markdown: str, page: Any, config: Any, files: Files) -> str
         known = files.get_file_from_path(uri) is not None
         return link.group() if known or not in_repository else text
 
+    answer = _AGES["answer_overview" if page.file.src_uri == "results.md" else "answer"]
+    markdown = answer(markdown, _SOURCES)
     return _LINK.sub(rewritten, "\n".join(map(_without_references, markdown.split("\n"))))
 
 

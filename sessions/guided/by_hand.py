@@ -12,8 +12,8 @@ from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Ask, Stage
 from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from sessions.recording.recorder import Level
 
 

@@ -96,7 +96,7 @@ class GraspByKeys(GraspCycle):
         for share in self._motion.shares(max(way_m / jog.jog_m_s, turn_rad / jog.jog_rad_s)):
             self._motion.set_base(start + share * (end - start))
             self._motion.tick()
-            if met := self._pressed_fingers(self.settings.landing_force_N):
+            if met := self.fingers.pressed(self.settings.landing_force_N):
                 self._motion.set_base(start)
                 self._motion.wait(self.settings.rest_s)
                 self._console.tell(f"{', '.join(met)} touched something: moved back by one step", Level.WARNING)
@@ -115,7 +115,8 @@ class GraspByKeys(GraspCycle):
     def close(self) -> None:
         prompt = "Close the fingers. g: close automatically; 1-5 close, 6-0 open one finger; c, o all; SPACE: done"
         self._console.enter(Stage.CLOSE, prompt, Ask.GO, Ask.FINGERS, Ask.NEXT, Ask.GIVE_UP)
-        self._progress, begun = self._open_progress(), False
+        self.fingers.set_open()
+        begun = False
         for request in self._guided.requests():
             if request.ask is Ask.GO:
                 super().close()
@@ -126,24 +127,24 @@ class GraspByKeys(GraspCycle):
                     begun = True
                 self._step_fingers(request)
             elif request.ask in (Ask.NEXT, Ask.CAPTURE):
-                self._touching = frozenset(self._pressed_fingers(self.settings.touch_force_N))
+                self.fingers.touching = frozenset(self.fingers.pressed(self.settings.touch_force_N))
                 return
 
     def _step_fingers(self, request: Request) -> None:
         """Close or open fingers by steps along their paths; each stops when it touches."""
-        table = self._table()
+        table, progress = self.fingers.table, self.fingers.progress
         way_m = self._console.settings.finger_step_m * request.steps
         asked = [finger for finger in request.fingers if finger in self._fingers]
         moving = set(asked)
         cycles = self._motion.cycles(abs(way_m) / (self.settings.closing_m_s * self._motion.supervisor.speed_scale))
         for _ in range(cycles):
             if way_m > 0.0:
-                moving -= set(self._pressed_fingers(self.settings.touch_force_N))
-                moving = {finger for finger in moving if self._may_close(finger, way_m / cycles)}
+                moving -= set(self.fingers.pressed(self.settings.touch_force_N))
+                moving = {finger for finger in moving if self.fingers.may_close(finger, way_m / cycles)}
             for finger in moving:
                 step = way_m / cycles / table.path(finger).length_m
-                self._progress[finger] = float(np.clip(self._progress[finger] + step, *table.path(finger).valid))
-            self._motion.set_fingers(table, self._progress)
+                progress[finger] = float(np.clip(progress[finger] + step, *table.path(finger).valid))
+            self._motion.set_fingers(table, progress)
             self._motion.tick()
         stopped = [finger for finger in asked if finger not in moving]
         if stopped and way_m > 0.0:
@@ -153,9 +154,9 @@ class GraspByKeys(GraspCycle):
         self._console.enter(Stage.HOLD, "Bringing the fingers to the contact force", Ask.GIVE_UP)
         super().settle()
         self._console.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.GIVE_UP)
-        hold_N = self._balanced_forces_N(self._touching, self.settings.contact_force_N)
+        hold_N = self.fingers.balanced_forces_N(self.fingers.touching, self.settings.contact_force_N)
         while not self._console.wants_capture():
-            self._servo_forces(hold_N)
+            self.fingers.servo_forces(hold_N)
             self._motion.tick()
 
     def capture(self) -> Grasp:
@@ -172,9 +173,9 @@ class GraspByKeys(GraspCycle):
         wanted = f"{np.degrees(turn_rad):+.0f}°"
         prompt = f"Turn the object. g: {wanted} as suggested; comma, full stop, arrows: steps; SPACE: done"
         self._console.enter(Stage.ROTATE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.UNDO)
-        hold_N = self._balanced_forces_N(touching, self.settings.squeeze_force_N)
+        hold_N = self.fingers.balanced_forces_N(touching, self.settings.squeeze_force_N)
         motion, jog = Pose3(), self._console.settings
-        for request in self._guided.requests(lambda: self._servo_forces(hold_N)):
+        for request in self._guided.requests(lambda: self.fingers.servo_forces(hold_N)):
             if request.ask is Ask.GO:
                 return super().reorient(turn_rad, shift_world_m, touching) * motion
             if request.ask is Ask.MOVE:

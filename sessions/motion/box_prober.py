@@ -20,7 +20,7 @@ from pydantic import Field
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from sessions.motion.bounding_box import SIDES, BoundingBox
-from sessions.motion.motion import GraspFrame
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.side_survey import SideSurvey
 from sessions.motion.touching import Toucher
 

@@ -12,16 +12,16 @@ from drivers.shadow.closing.closing import SIDES, Closing, closing
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
-from sessions.motion.finger_gaps import is_near, nears
+from sessions.motion.grasp_fingers import GraspFingers
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
-from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.motion import Motion
 from sessions.motion.side_survey import LOW_m
-from sessions.motion.touching import SideTouch, Toucher, travel_height_m
+from sessions.motion.touching import SideTouch, Toucher
+from sessions.motion.travel import travel_height_m
 from sessions.motion.weighing import Grip, LiftEnd, Weigher
 
-_HASTE_N, _FLIGHT_N = 1.0, 3.0
-"""Limits of the force error in force control: toward the object, and away from it."""
 _LEAST_HOLD_N = 0.1
 """A fingertip that presses less holds nothing."""
 
@@ -49,8 +49,9 @@ class GraspCycle:
         self._landing = Guard(motion, settings.landing_force_N, settings.held_up_rad)
         self._hand, self._yaw_window_rad = hand or HandShape(), yaw_window_rad
         self._plan: GraspPlan | None = None
-        self._progress = dict.fromkeys(self._fingers, 0.0)
-        self._touching: frozenset[str] = frozenset()
+        self.fingers = GraspFingers(motion, settings, self._hand)
+        """Close, hold and open."""
+
         self.landings_world_m: list[Array] = []
         """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
 
@@ -103,7 +104,6 @@ class GraspCycle:
 
     def _touch(self, plan: GraspPlan) -> bool:
         """Only touch, and rise again."""
-        self._touching = frozenset()
         if not self._table().is_sideways:
             self._toucher.tap(plan.frame, self.settings.touch.below_top_m)
             return True
@@ -119,10 +119,9 @@ class GraspCycle:
         return self._toucher.touch_side(plan.frame, side, self.settings.standoff_m, plan.height_m, low_m)
 
     def _move_above(self) -> None:
-        table, s = self._table(), self.settings
-        self._progress = self._open_progress()
+        s = self.settings
         self._motion.climb(self._above(), s.travel_m_s)
-        self._motion.blend_fingers(table, self._progress, s.finger_rad_s)
+        self.fingers.open_for(self._table())
         self._motion.move_base(self._above(), s.travel_m_s, s.turn_rad_s)
         self._motion.tare(s.rest_s)
 
@@ -196,47 +195,12 @@ class GraspCycle:
     # --- close and measure -------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close every finger along its path until it touches, meets the thumb, or reaches the end of the path.
-
-        Links above the fingertips have no sensors. A finger that one of them holds up stops, and all stop if the object
-        is pushed hard against a fingertip.
-        """
-        s, table = self.settings, self._table()
-        step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
-        moving, touched = set(self._fingers), dict.fromkeys(self._fingers, 0)
-        self._motion.runtime.begin_closing()
-        while moving and not self._pressed_fingers(s.closing_most_N):
-            loads_N = self._motion.loads_N()
-            for finger in moving:
-                touched[finger] = touched[finger] + 1 if loads_N.get(finger, 0.0) > s.touch_force_N else 0
-            held_up = self._motion.bent(s.held_up_rad)
-            moving = {
-                f for f in moving if touched[f] < s.touch_cycles and f not in held_up and self._may_close(f, step_m)
-            }
-            for finger in sorted(moving):
-                self._progress[finger] += step_m / table.path(finger).length_m
-            self._motion.set_fingers(table, self._progress)
-            self._motion.tick()
-        self._touching = frozenset(finger for finger in self._fingers if touched[finger] >= s.touch_cycles)
-
-    def _may_close(self, finger: str, step_m: float) -> bool:
-        path = self._table().path(finger)
-        on = self._progress[finger] + step_m / path.length_m
-        return self._progress[finger] < path.valid[1] and not (self._meets_thumb(finger) or self._nears(finger, on))
-
-    def _meets_thumb(self, finger: str) -> bool:
-        """Whether this tip and the thumb's (any other's, for the thumb) are about to touch each other."""
-        others = self._hand.form.long_fingers if finger == "TH" else ("TH",)
-        return is_near(self._table(), self._progress, finger, others, self.settings.finger_gap_m)
-
-    def _nears(self, finger: str, to: float) -> bool:
-        """Whether this tip would touch another on its way to a progress."""
-        return nears(self._table(), self._progress, finger, to, 2 * self._hand.radius_m)
+        """Close every finger until it touches; see :meth:`GraspFingers.close`."""
+        self.fingers.close()
 
     def settle(self) -> None:
         """Bring the fingers that touch to the contact force, then let hand and object come to rest."""
-        self._build_up(self._balanced_forces_N(self._touching, self.settings.contact_force_N), self.settings.settle_s)
-        self._motion.wait(self.settings.rest_s)
+        self.fingers.settle()
 
     def capture(self) -> Grasp:
         """Collect samples, compute a grasp from them, and take a picture of the held object."""
@@ -246,7 +210,8 @@ class GraspCycle:
 
     def squeeze(self, touching: frozenset[str]) -> None:
         """Build up the holding force of the fingers that touch; the thumb holds against their sum."""
-        self._build_up(self._balanced_forces_N(touching, self.settings.squeeze_force_N), self.settings.squeeze_s)
+        targets_N = self.fingers.balanced_forces_N(touching, self.settings.squeeze_force_N)
+        self.fingers.build_up(targets_N, self.settings.squeeze_s)
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
         """Turn about the grasp's vertical axis and shift while holding the object, unless it is jammed
@@ -261,7 +226,7 @@ class GraspCycle:
             The measured motion of the palm in the world, which carries the object (eq. 3.8).
         """
         motion, table, start = self._motion, self._table(), self.plan.frame
-        targets_N = self._balanced_forces_N(touching, self.settings.squeeze_force_N)
+        targets_N = self.fingers.balanced_forces_N(touching, self.settings.squeeze_force_N)
         duration_s = max(
             abs(turn_rad) / self.settings.carry_turn_rad_s,
             float(np.linalg.norm(shift_world_m)) / self.settings.carry_m_s,
@@ -275,8 +240,8 @@ class GraspCycle:
 
         def hold() -> bool:
             nonlocal pressed_cycles
-            self._servo_forces(targets_N)
-            pressed = self._pressed_fingers(self.settings.pressed_N)
+            self.fingers.servo_forces(targets_N)
+            pressed = self.fingers.pressed(self.settings.pressed_N)
             pressed_cycles = pressed_cycles + 1 if pressed else 0
             if pressed_cycles > self.settings.pressed_cycles:
                 self.jammed = pressed
@@ -286,9 +251,9 @@ class GraspCycle:
         motion.runtime.begin_hold()
         share = motion.follow(lambda share: motion.base_joints(frame_at(share), table), duration_s, hold)
         if self.jammed:
-            self._build_up(targets_N, self.settings.squeeze_s)
+            self.fingers.build_up(targets_N, self.settings.squeeze_s)
         motion.wait(self.settings.rest_s)
-        self._ease(touching)
+        self.fingers.ease(touching)
         motion.runtime.end_hold()
         self._plan = replace(self.plan, frame=frame_at(share))
         return motion.runtime.perception.world_T_palm * world_T_before.inverse()
@@ -296,90 +261,20 @@ class GraspCycle:
     def weigh(self, touching: frozenset[str]) -> LiftEnd:
         """Drag, lift and set down the object that these fingers hold; the runtime's perception knows what was found."""
         grip = Grip(
-            hold=lambda force_N: self._servo_forces(self._balanced_forces_N(touching, force_N)),
-            holding=lambda: frozenset(self._pressed_fingers(_LEAST_HOLD_N)),
-            is_pressed=lambda: bool(self._pressed_fingers(self.settings.pressed_N)),
+            hold=lambda force_N: self.fingers.servo_forces(self.fingers.balanced_forces_N(touching, force_N)),
+            holding=lambda: frozenset(self.fingers.pressed(_LEAST_HOLD_N)),
+            is_pressed=lambda: bool(self.fingers.pressed(self.settings.pressed_N)),
         )
         end = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
-        self._ease(touching)
+        self.fingers.ease(touching)
         self._motion.runtime.end_hold()
         return end
-
-    def _ease(self, touching: frozenset[str]) -> None:
-        """Press less and less, all fingers together, while the object is still felt.
-
-        The fingers open at different speeds and leave one after the other: what still presses then pushes the object.
-        """
-        s = self.settings
-        for share in self._motion.shares(s.ease_s):
-            force_N = s.squeeze_force_N + share * (s.ease_force_N - s.squeeze_force_N)
-            self._servo_forces(self._balanced_forces_N(touching, force_N))
-            self._motion.tick()
-
-    def _balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
-        """Force of each finger; the thumb balances the others' forces along the grasp's x axis."""
-        table = self._table()
-        forces_N = dict.fromkeys(sorted(touching - {"TH"}), force_N)
-        if "TH" in touching:
-            pushed_N = sum(-force_N * float(table.path(finger).direction[0]) for finger in forces_N)
-            forces_N["TH"] = max(force_N, pushed_N)
-        return forces_N
-
-    def _build_up(self, targets_N: dict[str, float], duration_s: float) -> None:
-        for _ in range(self._motion.cycles(duration_s)):
-            self._servo_forces(targets_N)
-            self._motion.tick()
-
-    def _servo_forces(self, targets_N: dict[str, float]) -> None:
-        """One cycle of force control: a fingertip moves along its path in proportion to its force error.
-
-        It retreats faster than it presses. A fingertip that is held up presses no further, and none does while another
-        is pressed hard. Overloaded fingers without a target force retreat.
-        """
-        s, table, loads_N = self.settings, self._table(), self._motion.loads_N()
-        pressed, held_up = self._pressed_fingers(s.pressed_N), self._motion.bent(s.held_up_rad)
-        errors_N = dict.fromkeys((*pressed, *held_up), -_HASTE_N)
-        for finger, target_N in targets_N.items():
-            most_N = 0.0 if pressed or finger in held_up else _HASTE_N
-            errors_N[finger] = float(np.clip(target_N - loads_N.get(finger, 0.0), -_FLIGHT_N, most_N))
-        for finger, error_N in errors_N.items():
-            path = table.path(finger)
-            step = s.squeeze_gain * error_N * self._motion.cycle_s / path.length_m
-            to = float(np.clip(self._progress[finger] + step, *path.valid))
-            if step < 0.0 or not self._nears(finger, to):
-                self._progress[finger] = to
-        self._motion.set_fingers(table, self._progress)
-
-    def _pressed_fingers(self, force_N: float) -> tuple[str, ...]:
-        """The fingertips with more than this force."""
-        return tuple(finger for finger, load_N in self._motion.loads_N().items() if load_N > force_N)
-
-    def _overloaded_fingers(self) -> set[str]:
-        """The fingers whose tips are pressed hard, or that are held up."""
-        return {*self._pressed_fingers(self.settings.pressed_N), *self._motion.bent(self.settings.held_up_rad)}
 
     # --- and away ----------------------------------------------------------------------------------------------
 
     def release(self) -> None:
-        """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
-
-        Overloaded fingers are released first, the others wait for them, or go on where they stand in their way.
-        """
-        table, closed, opened = self._table(), self._progress, self._open_progress()
-        step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
-        shares = dict.fromkeys(self._fingers, 0.0)
-
-        def place(finger: str, share: float) -> float:
-            return closed[finger] + min(1.0, share) * (opened[finger] - closed[finger])
-
-        while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
-            urgent = closed_still & self._overloaded_fingers()
-            free = {finger for finger in closed_still if not self._nears(finger, place(finger, shares[finger] + step))}
-            for finger in urgent & free or free or closed_still:
-                shares[finger] = min(1.0, shares[finger] + step)
-            self._progress = {finger: place(finger, shares[finger]) for finger in closed}
-            self._motion.set_fingers(table, self._progress)
-            self._motion.tick()
+        """Open the hand; see :meth:`GraspFingers.release`."""
+        self.fingers.release()
 
     def lift(self) -> None:
         """Back along the approach, where the hand came from the side, then straight up."""
@@ -391,10 +286,6 @@ class GraspCycle:
     def idle(self) -> None:
         """One cycle without motion."""
         self._motion.tick()
-
-    def _open_progress(self) -> dict[str, float]:
-        """Progress of the open hand."""
-        return {finger: self._table().path(finger).valid[0] for finger in self._fingers}
 
     def _table(self) -> Closing:
         return closing(self.plan.closing, self.plan.height_m, self._hand)

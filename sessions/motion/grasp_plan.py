@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from drivers.shadow.closing.closing import Closing, HIGHEST_m, LOWEST_m
-from sessions.motion.motion import GraspFrame
+from sessions.motion.grasp_frame import GraspFrame
 
 ContactHeight: TypeAlias = Annotated[float, Field(ge=LOWEST_m, le=HIGHEST_m)]
 """A setting: height of the fingertips' centres above the table, metres."""

@@ -7,19 +7,20 @@ checks it; so no step of the grasp cycle can be unsupervised.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from gtsam import Pose3, Rot3
 
 from drivers.core.clock import NANOSECONDS
-from drivers.core.contacts import FINGERS, Array, Grasp
+from drivers.core.contacts import Array, Grasp
 from drivers.positioner.positioner import mount_joints
 from drivers.shadow.closing.closing import Closing
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm
+from sessions.motion.finger_targets import FingerTargets
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.safety import SafetySupervisor
 from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
@@ -28,30 +29,6 @@ _STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))  # in the plane that a l
 _TARES = 5  # a fingertip that still swings is given so many rests
 _WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
 _LEVEL_m = 0.001
-
-
-@dataclass(frozen=True)
-class GraspFrame:
-    """A grasp frame on the table: world x, y of its origin and its yaw. The height is given by the closing."""
-
-    x_m: float
-    y_m: float
-    yaw_rad: float
-
-    @property
-    def pose(self) -> Pose3:
-        """``world_T_grasp``."""
-        return Pose3(Rot3.Yaw(self.yaw_rad), np.array([self.x_m, self.y_m, 0.0]))
-
-    def move(self, dx_m: float = 0.0, dy_m: float = 0.0, turn_rad: float = 0.0) -> GraspFrame:
-        """Shifted along the world's axes and turned about its own origin."""
-        return GraspFrame(self.x_m + dx_m, self.y_m + dy_m, self.yaw_rad + turn_rad)
-
-    def shifted_inside(self, shift_grasp_m: Array) -> GraspFrame:
-        """Shifted by a vector (2,) given in the grasp frame itself."""
-        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        x, y = shift_grasp_m
-        return self.move(float(c * x - s * y), float(s * x + c * y))
 
 
 class Motion:
@@ -64,7 +41,7 @@ class Motion:
 
     def __init__(self, runtime: RigRuntime, supervisor: SafetySupervisor) -> None:
         self.runtime, self.supervisor = runtime, supervisor
-        self._targets_rad: dict[str, float] = {}
+        self._fingers = FingerTargets(runtime)
         self._loads_N: dict[str, float] = {}
         self._resting_N: dict[str, float] = {}
         self.motor_torques: Array | None = None
@@ -83,11 +60,6 @@ class Motion:
     def form(self) -> HandForm:
         """Which hand moves."""
         return self.runtime.perception.form
-
-    @property
-    def _straight_wrist(self) -> dict[str, float]:
-        """Targets of the wrist's motors, where the hand has them."""
-        return {name: 0.0 for name in self.form.driven if name.startswith("WR")}
 
     # --- time --------------------------------------------------------------------------------------------------
 
@@ -282,13 +254,7 @@ class Motion:
             progress: of each finger.
             aside_rad: additional angles of single motors.
         """
-        targets = self._straight_wrist
-        for finger in closing.fingers:
-            targets.update(closing.joints(finger, progress[finger]))
-        for motor, angle in (aside_rad or {}).items():
-            targets[motor] += angle
-        self._targets_rad = targets
-        self.runtime.hand.set_targets(targets)
+        self.runtime.hand.set_targets(self._fingers.on(closing, progress, aside_rad or {}))
 
     def blend_fingers(
         self,
@@ -298,9 +264,9 @@ class Motion:
         aside_rad: Mapping[str, float] | None = None,
     ) -> None:
         """Move from the present targets to those at ``progress``, straight in joint space."""
-        start = self._present_targets(closing, progress)
+        start = self._fingers.present(closing, progress)
         self.set_fingers(closing, progress, aside_rad)
-        end = self._targets_rad
+        end = self._fingers.targets_rad
         duration_s = max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
         for share in self.shares(duration_s):
             self.runtime.hand.set_targets({name: (1 - share) * start[name] + share * end[name] for name in end})
@@ -308,35 +274,13 @@ class Motion:
 
     def finger_time_s(self, closing: Closing, progress: Mapping[str, float], speed_rad_s: float) -> float:
         """Time that the joint with the longest travel needs to reach the targets at ``progress``."""
-        start = self._present_targets(closing, progress)
-        end = {
-            name: angle
-            for finger in closing.fingers
-            for name, angle in closing.joints(finger, progress[finger]).items()
-        }
-        return max(abs(angle - start[name]) for name, angle in end.items()) / speed_rad_s
-
-    def _present_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
-        return self._targets_rad or self._measured_targets(closing, progress)
-
-    def _measured_targets(self, closing: Closing, progress: Mapping[str, float]) -> dict[str, float]:
-        """Present angles of the motors that ``progress`` will command."""
-        measured = self._measured_rad()
-        fingers = [name for finger in closing.fingers for name in closing.joints(finger, progress[finger])]
-        return {name: measured[name] for name in (*self._straight_wrist, *fingers)}
-
-    def _measured_rad(self) -> dict[str, float]:
-        """Present joint angles, and the sums of the coupled ones."""
-        joints = dict(zip(JOINTS, self.runtime.perception.joints_rad.tolist(), strict=True))
-        return joints | {f"{finger}J0": joints[f"{finger}J1"] + joints[f"{finger}J2"] for finger in FINGERS[:4]}
+        return self._fingers.travel_rad(closing, progress) / speed_rad_s
 
     def bent(self, least_rad: float) -> tuple[str, ...]:
         """Fingers with a joint farther off its target than this: something holds it, whether the fingertip measures it
         or not.
         """
-        measured = self._measured_rad()
-        off = [name for name, angle in self._targets_rad.items() if abs(measured[name] - angle) > least_rad]
-        return tuple(finger for finger in self.form.fingers if any(name.startswith(finger) for name in off))
+        return self._fingers.bent(least_rad)
 
     def loads_N(self) -> dict[str, float]:
         """Contact force on each fingertip at the end of the last cycle, minus its reading at rest if it could not be

@@ -14,7 +14,7 @@ from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.box_fit import fit_box, on_sides
-from sessions.motion.motion import GraspFrame
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.touching import SideTouch, Toucher
 
 _ASSUMED_m = 0.030

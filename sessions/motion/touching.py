@@ -8,19 +8,20 @@ touch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import Closing, closing, side_with_first_finger_down, sideways
-from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.closing.tip_motion import motor_rates
 from sessions.motion.cycle_settings import CycleSettings, TouchSettings
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.guard import Guard
-from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.motion import Motion
+from sessions.motion.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m
+from sessions.motion.travel import travel_height_m
 from sessions.perception.approach_paths import TipSurface
 
 
@@ -38,58 +39,7 @@ class SideTouch:
         return len(self.points_m)
 
 
-@dataclass(frozen=True)
-class Pattern:
-    """Arrangement of the fingertips in a touch.
-
-    Attributes:
-        closing: its paths.
-        progress: position on them, by finger.
-        held_rad: joint angles of fingers that are held out of the way, by finger and motor.
-    """
-
-    closing: str
-    progress: Mapping[str, float]
-    held_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-
-    def aside(self, table: Closing) -> dict[str, float]:
-        """Additional motor angles, relative to the closing's table, to hold those fingers, radians."""
-        wanted = {motor: angle for motors in self.held_rad.values() for motor, angle in motors.items()}
-        tabled = {m: a for finger in self.held_rad for m, a in table.joints(finger, self.progress[finger]).items()}
-        return {motor: wanted[motor] - angle for motor, angle in tabled.items()}
-
-
-TAP = Pattern("radial", {"FF": 0.70, "MF": 0.86, "RF": 0.78, "LF": 0.68, "TH": 0.62})
-"""Five fingertips around the middle of the grasp frame, far enough apart not to touch each other."""
-
-ROW = Pattern(
-    "pinch",
-    {"FF": 0.75, "MF": 0.75, "RF": 0.75, "LF": 0.75, "TH": 0.0},
-    {"TH": {"THJ1": 0.0, "THJ2": -0.6, "THJ3": 0.0, "THJ4": 0.0, "THJ5": -1.0}},
-)
-"""The four fingers in a row, the thumb beside them 100 mm above the table."""
-
-COLUMN = Pattern("pinch", {"FF": 0.75, "MF": 0.75, "RF": 0.75, "LF": 0.75, "TH": 0.0})
-"""The four fingers in a row; with the palm upright one above the other, the open thumb beside them."""
-
 _DOWN, _BACK = np.array([0.0, 0.0, -1.0]), np.array([-1.0, 0.0, 0.0])
-
-_FINGERS_HANG_m = 0.125
-"""Below the palm's origin, when the palm faces down."""
-
-TAP_HEIGHT_m = 0.022
-"""Height of the closing's table; the positioner adds the rest."""
-
-
-def travel_height_m(table: Closing, motion: Motion, cycle: CycleSettings, hand: HandShape) -> float:
-    """How far above a grasp the hand travels, all of it above the tallest thing that may stand on the table.
-
-    A palm that is upright turns over on its way to other grasps: the fingers then hang below it.
-    """
-    lowest_m = open_hand(table.name, table.height_m, hand).lowest_m
-    if table.is_sideways:
-        lowest_m = min(lowest_m, float(table.grasp_T_palm.z()) - _FINGERS_HANG_m)
-    return max(cycle.lift_m, motion.tallest_m + cycle.clearance_m - lowest_m)
 
 
 class Toucher:

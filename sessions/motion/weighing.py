@@ -17,8 +17,9 @@ from pydantic import Field
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import Closing
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import holds
-from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.motion import Motion
 
 
 class WeighingSettings(StrictModel):

@@ -28,7 +28,8 @@ from sessions.recording.pacing import AS_FAST_AS_POSSIBLE, pace
 from sessions.recording.session import Session
 from sessions.recording.session_events import SessionEvent
 from sessions.recording.traffic import schemas
-from sessions.recording.traffic.reader import Loss, TrafficReader
+from sessions.recording.traffic.loss import Loss
+from sessions.recording.traffic.reader import TrafficReader
 
 
 def kept_grasps(outcomes: Iterable[Outcome]) -> list[Grasp]:

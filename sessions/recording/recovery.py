@@ -20,7 +20,8 @@ from sessions.recording.manifest import MANIFEST, Manifest, manifest_from, read_
 from sessions.recording.session import CALIBRATION, RESULTS, TRAFFIC, TRAJECTORY, Session, new_folder
 from sessions.recording.session_ids import recovered_id
 from sessions.recording.traffic.disk import being_written
-from sessions.recording.traffic.reader import Loss, TrafficMessage, TrafficReader
+from sessions.recording.traffic.loss import Loss
+from sessions.recording.traffic.reader import TrafficMessage, TrafficReader
 from sessions.recording.traffic.settings import Attached, TrafficSettings
 from sessions.recording.traffic.writer import TrafficWriter
 

@@ -172,7 +172,7 @@ class RigRuntime:
         while not self.perception.ready:
             if self.clock.now_ns() > give_up_ns:
                 what = f"no sample from the hand or the positioner within {READY_TIMEOUT_ns / NANOSECONDS:g} s"
-                raise DeviceError(what, where="bench", hint="Check power and cables, then try again")
+                raise DeviceError(what, where="rig runtime", hint="Check power and cables, then try again")
             self.cycle()
 
     def _close_all(self) -> list[TactileLabError]:
@@ -218,8 +218,7 @@ class RigRuntime:
         while self.clock.now_ns() < end_ns:
             self.cycle()
 
-    # --- session events
-    # -------------------------------------------------------------------------------------------------
+    # --- session events ----------------------------------------------------------------------------------------
 
     def tare(self, fingers: Iterable[str] = FINGERS) -> TareReport:
         """Tare the named, untouched fingertips; refusals are reported and recorded as warnings."""

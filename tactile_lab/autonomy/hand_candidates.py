@@ -23,10 +23,10 @@ from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.collision_spheres import Verdicts
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from sessions.motion.safety import SafetySettings
-from sessions.motion.touching import TAP, TAP_HEIGHT_m
+from sessions.motion.touch_patterns import TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.collision_check import links_are_clear, standing
 from tactile_lab.autonomy.heuristic_planner import PlanSettings
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, closing_rays

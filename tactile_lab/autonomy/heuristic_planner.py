@@ -17,8 +17,8 @@ from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import transform_points
 from drivers.shadow.closing.closing import PRESHAPES
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import ContactHeight, GraspPlan
-from sessions.motion.motion import GraspFrame
 
 
 class PlanSettings(StrictModel):

@@ -14,8 +14,8 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.cycle_settings import TouchSettings
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
 from tactile_lab.autonomy.rival_objects import rival_objects

@@ -13,8 +13,8 @@ from gtsam import Pose2
 from numpy.typing import NDArray
 
 from drivers.core.contacts import Array, Grasp
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.hand_candidates import HandCandidate, HandLimits, HasRoom, Offer, anywhere, offer
 from tactile_lab.autonomy.regrasp_planner import RegraspPlanner, with_contacts
 from tactile_lab.autonomy.variance_planner import KnownShape

@@ -14,7 +14,7 @@ import numpy as np
 from gtsam import Pose2
 
 from drivers.core.contacts import Array, Grasp
-from sessions.motion.motion import GraspFrame
+from sessions.motion.grasp_frame import GraspFrame
 from tactile_lab.autonomy.hand_candidates import HandLimits, HasRoom, anywhere, offer
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.exploration.candidates import Candidate

@@ -20,8 +20,8 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from drivers.core.observability import planar_observability
 from drivers.shadow.closing.closing import LEANING, Closing
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import ContactHeight, GraspPlan
-from sessions.motion.motion import GraspFrame
 from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays, ModelledObject, outward, ring_of_candidates
 from tactile_lab.slam.exploration.expected_information import InformationSettings
 from tactile_lab.slam.exploration.policies import POLICIES

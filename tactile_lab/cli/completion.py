@@ -53,7 +53,7 @@ def complete_experiment(incomplete: str) -> list[str]:
     """Experiments."""
     from tactile_lab.experiments.catalogue import EXPERIMENTS
 
-    return _beginning(incomplete, ["commands", "list", "pages", *EXPERIMENTS])
+    return _beginning(incomplete, ["age", "commands", "list", "pages", *EXPERIMENTS])
 
 
 def complete_session(ctx: typer.Context, incomplete: str) -> list[str]:

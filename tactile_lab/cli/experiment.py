@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from tactile_lab.experiments.cells import Row
     from tactile_lab.experiments.experiment import Experiment
+    from tactile_lab.experiments.results.publishing import Age
     from tactile_lab.experiments.results.stored_result import Part
 
 
@@ -35,7 +36,7 @@ def experiment(
         str,
         typer.Argument(
             help="Name of the experiment. 'list' lists all experiments, 'pages' writes the pages of stored results, "
-            "'commands' prints the commands that made them.",
+            "'age' says which of them are older than the code, 'commands' prints the commands that made them.",
             autocompletion=complete_experiment,
         ),
     ],
@@ -147,6 +148,31 @@ def _write_pages(docs: Path, as_json: bool = False) -> None:
     for path in changed:
         say(f"page  {path}")
     say(f"{len(changed)} pages and pictures changed")
+    say(_age_in_words(_ages(docs)))
+
+
+def _show_age(docs: Path, as_json: bool) -> None:
+    from tactile_lab.cli.console import emit_json, say, show_table
+
+    ages = _ages(docs)
+    if as_json:
+        emit_json([vars(age) for age in ages])
+        return
+    rows = [(age.name, age.date, age.version, "this version" if age.is_current else "older") for age in ages]
+    show_table("Stored results", ["name", "made on", "made by", "the code"], rows)
+    say(_age_in_words(ages))
+
+
+def _ages(docs: Path) -> list[Age]:
+    from tactile_lab.experiments.execution.source_version import version
+    from tactile_lab.experiments.results.publishing import ages
+
+    return ages(docs, version())
+
+
+def _age_in_words(ages: Sequence[Age]) -> str:
+    older = sum(not age.is_current for age in ages)
+    return f"{older} of {len(ages)} stored tables were made by an older version of the code"
 
 
 def _show_commands(docs: Path, as_json: bool) -> None:
@@ -176,7 +202,12 @@ def _list(docs: Path, as_json: bool) -> None:
     )
 
 
-_WORDS: Mapping[str, Callable[[Path, bool], None]] = {"list": _list, "pages": _write_pages, "commands": _show_commands}
+_WORDS: Mapping[str, Callable[[Path, bool], None]] = {
+    "list": _list,
+    "pages": _write_pages,
+    "age": _show_age,
+    "commands": _show_commands,
+}
 """Keywords accepted in place of a name, and what they do."""
 
 

@@ -19,7 +19,7 @@ from sessions.conductor.progress import NullProgress, Progress
 from sessions.conductor.session_outcome import SessionOutcome
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.recording.session import RESULTS, Session
-from sessions.recording.traffic.reader import Loss
+from sessions.recording.traffic.loss import Loss
 from tactile_lab import report
 from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate

@@ -13,7 +13,7 @@ from sessions.conductor.progress import NullProgress, Progress
 from sessions.perception.replay import Replay, kept_grasps
 from sessions.recording.pacing import AS_FAST_AS_POSSIBLE
 from sessions.recording.session import Session
-from sessions.recording.traffic.reader import Loss
+from sessions.recording.traffic.loss import Loss
 from tactile_lab.evaluation.truth.session_truth import session_truth
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session

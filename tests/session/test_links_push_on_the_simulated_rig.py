@@ -10,8 +10,9 @@ from drivers.simulation.settings import ObjectStart
 from drivers.simulation.world import SimulatedWorld
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.motion import Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.recording.recorder import Recorder
 from tactile_lab.autonomy.autonomous_roles import hand_shape

@@ -17,8 +17,8 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, LOWEST_m, closing, sideways
 from drivers.shadow.closing.posture import HandShape
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear

@@ -10,14 +10,14 @@ from drivers.core.configuration import load_model
 from tactile_lab.experiments.plots import draw
 from tactile_lab.experiments.results.claims import MET, Claim, Claims, Goal, judge_goal, plot
 from tactile_lab.experiments.results.pages import WIDTH
-from tactile_lab.experiments.results.stored_result import Part, StoredResult
+from tactile_lab.experiments.results.stored_result import StoredResult
 from tactile_lab.experiments.results.storing import PICTURES, RESULTS
 from tactile_lab.experiments.summary import markdown
 
 OVERVIEW, CLAIMS = "results.md", "claims.yaml"
 
 
-def overview(docs: Path, results: Mapping[str, StoredResult], sources: str) -> dict[str, str]:
+def overview(docs: Path, results: Mapping[str, StoredResult]) -> dict[str, str]:
     """The page and the pictures of the claims, by their paths in the folder of documents.
 
     Raises:
@@ -26,7 +26,7 @@ def overview(docs: Path, results: Mapping[str, StoredResult], sources: str) -> d
     written = load_model(docs / RESULTS / CLAIMS, Claims)
     texts = {_picture(claim): draw(claim.title, plot(claim, results)) for claim in written.claims}
     sections = [_section(claim, results) for claim in written.claims]
-    pages = [written.intro.strip(), _glance(written, results, sources), *sections, written.outro.strip()]
+    pages = [written.intro.strip(), _glance(written, results), *sections, written.outro.strip()]
     texts[OVERVIEW] = "\n\n".join([*pages, _index(written, results)]).rstrip() + "\n"
     return texts
 
@@ -35,19 +35,14 @@ def _picture(claim: Claim) -> str:
     return f"{PICTURES}/claim-{claim.name}.svg"
 
 
-def _glance(claims: Claims, results: Mapping[str, StoredResult], sources: str) -> str:
+def _glance(claims: Claims, results: Mapping[str, StoredResult]) -> str:
     """All goals in one table."""
     rows = [["", "asked", "reached", "", "made by"]]
     for claim in claims.claims:
         for goal in claim.goals:
             found = judge_goal(goal, results)
-            rows.append([goal.what, _limit(goal), found.text, found.verdict, _made_by(found.part, sources)])
+            rows.append([goal.what, _limit(goal), found.text, found.verdict, found.part.made_by.version])
     return markdown(rows).rstrip("\n")
-
-
-def _made_by(part: Part, sources: str) -> str:
-    made = part.made_by
-    return "this version" if made.is_of(sources) else f"older: {made.commit or made.sources}"
 
 
 def _limit(goal: Goal) -> str:

@@ -19,21 +19,20 @@ WIDTH = 140
 _ABOUT = re.compile(r"<!-- about: (?P<version>.+?) -->\n+")
 
 
-def page(result: StoredResult, sources: str, notes: str = "", picture: str = "") -> str:
+def page(result: StoredResult, notes: str = "", picture: str = "") -> str:
     """The page in Markdown.
 
     Args:
         result: the result that it shows.
-        sources: hash of the present sources: parts made by others are marked as older.
         notes: written by hand in Markdown; a first line ``<!-- about: VERSION -->`` names the version that they refer
             to.
         picture: path of the plot, relative to the page; "" if there is none.
     """
     first, *earlier = result.parts
-    begin = [f"# {result.name}", fill(result.sentence, WIDTH), first.made_by.words(sources)]
+    begin = [f"# {result.name}", fill(result.sentence, WIDTH), first.made_by.in_words()]
     begin += [_notes(notes, first)] if notes else []
     begin += [f"![{result.sentence}]({picture})"] if picture else []
-    parts = [_part(first), *(f"## Made earlier\n\n{part.made_by.words(sources)}\n\n{_part(part)}" for part in earlier)]
+    parts = [_part(first), *(f"## Made earlier\n\n{part.made_by.in_words()}\n\n{_part(part)}" for part in earlier)]
     return "\n\n".join([*begin, *parts]) + "\n"
 
 
@@ -56,8 +55,7 @@ def _table(table: Table) -> str:
 def _notes(notes: str, newest: Part) -> str:
     """The hand-written notes, with a remark if they refer to another version than the figures."""
     found, text = _ABOUT.match(notes), _ABOUT.sub("", notes, count=1).strip()
-    made = newest.made_by.sources or newest.made_by.commit
-    if found is None or found["version"] == made:
+    if found is None or found["version"] == newest.made_by.version:
         return text
     return f"*Written about the results of {found['version']}:*\n\n{text}"
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.core.atomic_files import write_whole
-from tactile_lab.experiments.execution.source_version import version
 from tactile_lab.experiments.plots import draw
 from tactile_lab.experiments.results.overview import overview
 from tactile_lab.experiments.results.pages import merge_plots, page
@@ -22,18 +22,40 @@ def stored_results(docs: Path) -> dict[str, StoredResult]:
     return {file.stem: StoredResult.read(file) for file in files}
 
 
-def make_pages(docs: Path, sources: str | None = None) -> dict[str, str]:
-    """Every page and picture, by its path in the folder of documents.
+@dataclass(frozen=True)
+class Age:
+    """Whether a part of a stored result was made by the present code.
 
-    Args:
-        docs: folder of the documents.
-        sources: hash of the sources to compare results with; None for those of this program.
+    Attributes:
+        name: of the result.
+        date: day on which the part was made.
+        version: hash of the sources that made it, or a commit.
+        is_current: whether these are the present sources.
+    """
+
+    name: str
+    date: str
+    version: str
+    is_current: bool
+
+
+def ages(docs: Path, sources: str) -> list[Age]:
+    """The age of every part of every stored result, compared with a hash of sources. Raises SessionError."""
+    return [
+        Age(name, made.date, made.version, made.is_of(sources))
+        for name, result in stored_results(docs).items()
+        for made in (part.made_by for part in result.parts)
+    ]
+
+
+def make_pages(docs: Path) -> dict[str, str]:
+    """Every page and picture, by its path in the folder of documents.
 
     Raises:
         SessionError: a file is not a stored result.
         ConfigurationError: the claims do not fit the stored results.
     """
-    sources, results = sources or version(), stored_results(docs)
+    results = stored_results(docs)
     texts: dict[str, str] = {}
     for name, result in results.items():
         plot, notes = merge_plots(result.parts), docs / RESULTS / NOTES / f"{name}.md"
@@ -41,8 +63,8 @@ def make_pages(docs: Path, sources: str | None = None) -> dict[str, str]:
             texts[f"{PICTURES}/{name}.svg"] = draw(result.sentence.rstrip("."), plot)
         written = notes.read_text(encoding="utf-8").replace("](../", "](") if notes.is_file() else ""  # one folder up
         picture = f"../{PICTURES}/{name}.svg" if plot is not None else ""
-        texts[f"{RESULTS}/{name}.md"] = MARK.format(name=name) + page(result, sources, written, picture)
-    return {**texts, **overview(docs, results, sources)}
+        texts[f"{RESULTS}/{name}.md"] = MARK.format(name=name) + page(result, written, picture)
+    return {**texts, **overview(docs, results)}
 
 
 def publish(docs: Path) -> list[Path]:

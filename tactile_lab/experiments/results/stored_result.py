@@ -15,6 +15,7 @@ from typing import Any, Self
 from drivers.core.atomic_files import write_whole
 from drivers.core.errors import SessionError
 from tactile_lab.experiments.plot_data import Plot
+from tactile_lab.experiments.results.page_ages import ASK
 
 FORMAT = "tactile-result/1"
 
@@ -76,16 +77,19 @@ class MadeBy:
     date: str
     machine: str
 
+    @property
+    def version(self) -> str:
+        """What names the code that made it: the hash of its sources, or a commit."""
+        return self.sources or self.commit or "unknown"
+
     def is_of(self, sources: str) -> bool:
         """Whether these sources made it."""
         return self.sources == sources
 
-    def words(self, sources: str) -> str:
-        """The version, and whether it is older than the sources, as a sentence."""
-        by = f"commit {self.commit}" if self.sources is None else f"{self.program}, sources {self.sources}"
-        if self.is_of(sources):
-            return f"Made by this version of the code ({by}), {self.date}, {self.machine}."
-        return f"**Made by an older version of the code** ({by}), {self.date}, {self.machine}."
+    def in_words(self) -> str:
+        """The version as a sentence."""
+        by = f"commit {self.commit}" if self.sources is None else f"sources {self.sources}, version {self.program}"
+        return f"Made on {self.date} by {by}, on {self.machine}. {ASK}"
 
 
 @dataclass(frozen=True)

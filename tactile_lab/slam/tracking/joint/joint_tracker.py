@@ -20,20 +20,14 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.fixed_lag import unfold
 from tactile_lab.slam.tracking.evidence.motion_cost import estimated_noise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
-from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
 from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 from tactile_lab.slam.tracking.joint.branching import Branching
-from tactile_lab.slam.tracking.joint.deferred_association import (
-    Relocate,
-    associate_deferred,
-    propose_pushes,
-    relocate_last,
-)
+from tactile_lab.slam.tracking.joint.deferred_association import Relocate, propose_pushes, relocate_last
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest, weights
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 from tactile_lab.slam.tracking.joint.pose_covariance import PoseCovariances, with_covariances
+from tactile_lab.slam.tracking.joint.second_opinions import SecondOpinions
 from tactile_lab.slam.tracking.joint.settings import JointSettings
-from tactile_lab.slam.tracking.joint.trajectory_splicing import splice_trajectories
 
 _LEAST_TO_RELOCATE = 3
 _LEAST_KNOWN = 30
@@ -44,9 +38,6 @@ _POOR_GAIN = 2.5
 
 _LEAST_FOR_FACES = 3
 """Number of grasps; fewer have hardly any faces in common."""
-
-_MOST_REGROUPINGS = 3
-"""A trajectory with several wrong turns is repaired at one after the other."""
 
 _LARGE_FIELD = 150
 """Contacts; in the plane its factor takes 1.6 MB, and four times as much for twice as many."""
@@ -212,62 +203,20 @@ class JointTracker:
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and not self._has_settled and readable:
             self._hypotheses = self._scorer.different(self._hypotheses + self._backwards())
-        self._regroup()
+        opinions = SecondOpinions(self._scorer, self._noise, self._settings, self.mechanisms, self._relocate)
+        self._hypotheses = opinions.splice_best(self._hypotheses)
         for _ in range(2):
             iterations = self._settings.final_iterations
             smoothed = [self._scorer.smooth(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
-        self._hypotheses = [self._associate_deferred(one) for one in self._hypotheses]
-        faceted = self._score_with_facets()
+        faceted = opinions.with_faces([opinions.place_deferred(one) for one in self._hypotheses])
+        self._rivals = opinions.rivals
         found = PoseCovariances.of(faceted[0].map, self._noise)
         faceted[0] = replace(faceted[0], map=with_covariances(faceted[0].map, found.birth))
         self._common_covariances = found.common
         self._hypotheses = [replace(one, map=unfold(one.map)) for one in faceted]
         self._has_ended = True
-
-    def _score_with_facets(self) -> list[Hypothesis]:
-        """The hypotheses scored by flat faces, most likely first.
-
-        If splicing the most likely one makes it more likely without faces, the result is tested too. Faces decide again
-        which contacts are left out, so that trajectories that differ only in these are tested once.
-        """
-        sharp = FacetedScorer(self._scorer, self._noise, self.mechanisms)
-        known = self._scorer.different(self._hypotheses, by_contacts=False)
-        found = [sharp.better(one.map) for one in known]
-        best = min(found, key=cost)
-        limit = self._scorer.score(best.map).cost
-        likelier = self.mechanisms.add("splicing", lambda: self._spliced_below(limit, best, known))
-        ranked = sorted(found + [sharp.better(one.map) for one in likelier], key=cost)
-        best = self.mechanisms.improve("regular faces", self._relocalize(ranked[0], sharp), sharp.regular)
-        return [best, *self._scorer.unlike(ranked[1:], [best])]
-
-    def _spliced_below(self, limit: float, best: Hypothesis, known: list[Hypothesis]) -> list[Hypothesis]:
-        """Other splices of a hypothesis that are more likely than a limit and differ from all known trajectories."""
-        others = self._scorer.unlike(self._splice(best), known, by_contacts=False)
-        return [one for one in others if one.cost < limit]
-
-    def _relocalize(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
-        """The hypothesis with grasps relocalized on its object."""
-        relocalizer = Relocalizer(sharp, self._noise, self._settings.proposals)
-        placed = self._retry_unplaced(hypothesis, sharp)
-        found = self.mechanisms.improve("placing on the object", placed, relocalizer.improve)
-        self._rivals = relocalizer.rivals
-        return found
-
-    def _retry_unplaced(self, best: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
-        """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""
-        again = self._associate_deferred(self._scorer.score(best.map))
-        return best if again.map is best.map else min(best, sharp.better(again.map), key=cost)
-
-    def _associate_deferred(self, hypothesis: Hypothesis) -> Hypothesis:
-        relocate = self._relocate if self.mechanisms.has("relocation") else None
-        noise, proposals, pushes = self._noise, self._settings.proposals, self.mechanisms.has("pushes")
-        return self.mechanisms.improve(
-            "deferred association",
-            hypothesis,
-            lambda given: associate_deferred(given, noise, proposals, relocate, self._scorer, pushes=pushes),
-        )
 
     def _push(self, best: Hypothesis) -> list[Hypothesis]:
         return propose_pushes(best, self._noise, self._settings.proposals, self._scorer)
@@ -286,27 +235,6 @@ class JointTracker:
             tracker.resample()
         self.mechanisms.changed |= tracker.mechanisms.changed
         return [self._scorer.score(self.map.reread(one.map)) for one in tracker.hypotheses]
-
-    def _regroup(self) -> None:
-        """Splice the most likely hypothesis, and repeat with a more likely result."""
-        for _ in range(_MOST_REGROUPINGS):
-            best = min(self._hypotheses, key=cost)
-            spliced = self._splice(best) if self.mechanisms.has("splicing") else []
-            found = self._scorer.different(self._hypotheses + spliced)
-            self._hypotheses = self._likeliest(found, self._settings.hypotheses)
-            if any(kept is one for kept in self._hypotheses for one in spliced):
-                self.mechanisms.changed.add("splicing")
-            if self._hypotheses[0].cost >= best.cost:
-                break
-
-    def _splice(self, hypothesis: Hypothesis) -> list[Hypothesis]:
-        """The hypothesis spliced at its least likely steps."""
-        others = [
-            self._scorer.score(one)
-            for one in splice_trajectories(hypothesis.map, self._noise, self._settings.proposals)
-        ]
-        promising = sorted(others, key=cost)[: self._settings.smoothed]
-        return [self._scorer.smooth(other.map, self._settings.iterations) for other in promising]
 
     def _relocate_grasp(self, best: Hypothesis) -> list[Hypothesis]:
         """Poses anywhere on the object, if a grasp does not fit the known part of it near the predicted pose."""

@@ -21,8 +21,8 @@ from sessions.conductor.estimator import Reorientation
 from sessions.conductor.estimator_client import EstimatorClient
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from sessions.recording.recorder import Level
 from sessions.recording.session_events import EventKind
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles

@@ -13,7 +13,8 @@ from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.motion.bounding_box import SIDES, BoundingBox
 from sessions.motion.box_prober import BoxProber, ProbingSettings
 from sessions.motion.cycle_settings import CycleSettings
-from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.grasp_frame import GraspFrame
+from sessions.motion.motion import Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.motion.touching import Toucher
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles

@@ -13,8 +13,9 @@ from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.model.kinematics import JOINT_INDEX
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.motion import Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
@@ -35,7 +36,7 @@ class Strain:
         self.cycle = GraspCycle(self.motion, QUICK, TIP)
         self.extra_N: dict[str, float] = {}
         self.held_rad: dict[str, float] = {}
-        felt, joints = self.motion.loads_N, self.motion._measured_rad
+        felt, joints = self.motion.loads_N, self.motion._fingers._measured_rad
 
         def loads_N() -> dict[str, float]:
             return {finger: load_N + self.extra_N.get(finger, 0.0) for finger, load_N in felt().items()}
@@ -45,7 +46,7 @@ class Strain:
             return found | {name: found[name] + off for name, off in self.held_rad.items()}
 
         monkeypatch.setattr(self.motion, "loads_N", loads_N)
-        monkeypatch.setattr(self.motion, "_measured_rad", measured)
+        monkeypatch.setattr(self.motion._fingers, "_measured_rad", measured)
 
     def grasp(self) -> frozenset[str]:
         """Down, closed, settled and captured: the fingers that touch."""
@@ -61,7 +62,7 @@ def strain(monkeypatch: pytest.MonkeyPatch) -> Strain:
 
 
 def ways(cycle: GraspCycle) -> Mapping[str, float]:
-    return dict(cycle._progress)
+    return dict(cycle.fingers.progress)
 
 
 def test_a_finger_bent_on_the_way_down_has_landed(strain: Strain) -> None:
@@ -92,7 +93,7 @@ def test_a_finger_that_is_held_up_closes_no_farther_and_the_others_do(strain: St
     closed = ways(strain.cycle)
     assert closed["MF"] == opened["MF"]
     assert all(closed[finger] > opened[finger] for finger in FINGERS if finger != "MF")
-    assert "MF" not in strain.cycle._touching
+    assert "MF" not in strain.cycle.fingers.touching
 
 
 def test_all_fingers_stop_closing_where_one_is_pressed_hard(strain: Strain) -> None:
@@ -183,12 +184,12 @@ def test_a_finger_that_stays_strained_does_not_keep_the_hand_closed(strain: Stra
 def test_a_strained_finger_opens_no_farther_than_its_neighbour_leaves_room(strain: Strain) -> None:
     """The middle finger, opened alone from a radial grasp, came to where the first finger was: its sensor saturated."""
     cycle, gaps_m = strain.cycle, list[float]()
-    cycle._plan = GraspPlan(GraspFrame(0.0, 0.0, 0.3), "radial", 0.034)
-    cycle._progress = dict.fromkeys(FINGERS, 0.97)
+    assert cycle.descend(GraspPlan(GraspFrame(0.0, 0.0, 0.3), "radial", 0.034))
+    cycle.fingers.progress = dict.fromkeys(FINGERS, 0.97)
     strain.extra_N = {"MF": 20.0}
 
     def watch(world: DiscWorld) -> None:
-        centres = [cycle._table().path(finger).centre_m(cycle._progress[finger]) for finger in ("FF", "MF")]
+        centres = [cycle._table().path(finger).centre_m(cycle.fingers.progress[finger]) for finger in ("FF", "MF")]
         gaps_m.append(float(np.linalg.norm(centres[0] - centres[1])))
 
     strain.world.before_cycle = watch
@@ -200,7 +201,7 @@ def test_a_strained_finger_opens_no_farther_than_its_neighbour_leaves_room(strai
 def test_a_finger_closes_no_farther_than_to_its_neighbour(strain: Strain) -> None:
     """The middle finger has stopped early on something narrow; the first would close to the same place."""
     assert strain.cycle.descend(replace(PLAN, closing="radial"))
-    strain.cycle._progress["MF"] = 0.73
+    strain.cycle.fingers.progress["MF"] = 0.73
     strain.held_rad = {"MFJ0": 0.3}
     strain.world.disc = None
     strain.cycle.close()

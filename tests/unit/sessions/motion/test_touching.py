@@ -12,10 +12,12 @@ from drivers.shadow.closing.tip_motion import motor_rates
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal_matrices
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame, Motion
+from sessions.motion.motion import Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
-from sessions.motion.touching import TAP, TAP_HEIGHT_m, Toucher
+from sessions.motion.touch_patterns import TAP, TAP_HEIGHT_m
+from sessions.motion.touching import Toucher
 from sessions.recording.session_events import EventKind
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet

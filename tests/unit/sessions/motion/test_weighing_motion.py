@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from sessions.motion.motion import GraspFrame
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.weighing import Grip, LiftEnd, Weigher, WeighingSettings
 
 ALL = frozenset({"FF", "MF", "TH"})

@@ -19,8 +19,8 @@ from sessions.conductor.policy_decisions import PolicyDecisions, Proposal, appro
 from sessions.guided.attended import AttendedDecisions
 from sessions.guided.operator import Ask, Panel, Request
 from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from sessions.motion.safety import SafetySettings
 from tactile_lab.autonomy.hand_candidates import (
     LANDED,

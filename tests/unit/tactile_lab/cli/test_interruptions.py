@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from sessions.conductor.policy_decisions import Proposal
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from tactile_lab.cli.calibrate import wizard
 from tactile_lab.cli.interruptions import interruptions_heeded
 from tactile_lab.cli.main import main

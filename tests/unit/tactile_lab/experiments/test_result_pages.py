@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 
-from tactile_lab.experiments.results.publishing import make_pages, publish, stored_results
+from tactile_lab.cli.main import main
+from tactile_lab.experiments.results.page_ages import ASK, OLDER, answer, answer_overview
+from tactile_lab.experiments.results.publishing import ages, make_pages, publish, stored_results
 
 DOCS = Path(__file__).resolve().parents[4] / "docs"
 BY_HAND = {"ablation", "machine", "mutants"}
 RENEW = "run 'make results' (tactile-lab experiment pages) and commit what it writes"
-VERDICT = re.compile(
-    r"Made by this version of the code|\*\*Made by an older version of the code\*\*|this version|older: "
-)
 
 
 @pytest.fixture(scope="module")
@@ -23,14 +23,15 @@ def written() -> dict[str, str]:
 
 
 def test_the_pages_are_those_that_make_results_writes(written: dict[str, str]) -> None:
-    """Whether a result is older is left to the next test: it changes with any source."""
-    differ = [path for path, text in written.items() if _as_it_stands(path) != VERDICT.sub("", text)]
+    differ = [path for path, text in written.items() if (DOCS / path).read_text(encoding="utf-8") != text]
     assert differ == [], RENEW
 
 
-def test_no_page_says_that_an_older_result_is_of_this_version(written: dict[str, str]) -> None:
-    differ = [path for path, text in written.items() if (DOCS / path).read_text(encoding="utf-8") != text]
-    assert differ == [], f"sources have changed since a result was stored: {RENEW}"
+def test_every_page_asks_for_the_age_of_all_its_tables(written: dict[str, str]) -> None:
+    for name, result in stored_results(DOCS).items():
+        text = written[f"results/{name}.md"]
+        assert text.count(ASK) == len(result.parts)
+        assert answer(text, "another").count(OLDER) == len(result.parts)
 
 
 def test_there_are_no_other_pages_and_notes() -> None:
@@ -65,6 +66,23 @@ def test_links_of_the_overview_lead_to_files() -> None:
     assert [transport for transport in found if "://" not in transport and not (DOCS / transport).is_file()] == []
 
 
-def _as_it_stands(path: str) -> str:
-    file = DOCS / path
-    return VERDICT.sub("", file.read_text(encoding="utf-8")) if file.is_file() else ""
+def test_ages_compare_every_part_with_the_present_sources() -> None:
+    found = ages(DOCS, "none of these")
+    assert len(found) == sum(len(result.parts) for result in stored_results(DOCS).values())
+    assert not any(age.is_current for age in found)
+    one = next(age for age in found if len(age.version) == 16)  # a hash of sources, not a commit
+    assert next(age for age in ages(DOCS, one.version) if age.version == one.version).is_current
+
+
+def test_a_command_lists_the_ages(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["experiment", "age", "--docs", str(DOCS), "--json"])
+    assert not ended.value.code
+    assert [entry["name"] for entry in json.loads(capsys.readouterr().out)] == [age.name for age in ages(DOCS, "")]
+
+
+def test_the_sites_overview_says_so_of_every_figure() -> None:
+    text = (DOCS / "results.md").read_text(encoding="utf-8")
+    table = [line for line in text.splitlines() if line.startswith("|")][2:]
+    told = [line for line in answer_overview(text, "another").splitlines() if line.endswith(" |")]
+    assert len([line for line in told if "| older: " in line]) == len(table) > 40

@@ -13,6 +13,7 @@ from drivers.core.errors import ConfigurationError, SessionError
 from tactile_lab.experiments.plot_data import CurvePanel, Plot, Range, RangePanel, Series
 from tactile_lab.experiments.results import claims
 from tactile_lab.experiments.results.claims import Goal, Panel, Place, find, judge_goal, numbers_in
+from tactile_lab.experiments.results.page_ages import CURRENT, OLDER, answer, answer_overview
 from tactile_lab.experiments.results.pages import merge_plots, page
 from tactile_lab.experiments.results.stored_result import MadeBy, Part, StoredResult, Table
 from tactile_lab.experiments.results.storing import combine, store
@@ -89,19 +90,28 @@ def test_store_needs_a_folder_of_results(tmp_path: Path) -> None:
     assert len(StoredResult.read(file).parts) == 1
 
 
-def test_a_page_says_by_which_version_it_was_made_and_whether_that_is_older() -> None:
+def test_a_page_says_when_and_by_which_version_each_part_was_made() -> None:
     result = StoredResult("test", "It is shown.", (made(NOW, ("joint", "L")), made(OLD, ("icp", "a | b"))))
-    fresh, earlier = page(result, "aaaa").split("## Made earlier")
-    assert "Made by this version of the code (0.2.0, sources aaaa)" in fresh
-    assert "**Made by an older version of the code** (commit d33d489)" in earlier
+    fresh, earlier = page(result).split("## Made earlier")
+    assert "by sources aaaa, version 0.2.0" in fresh
+    assert "by commit d33d489" in earlier
     assert "a \\| b" in earlier
-    assert "**Made by an older version of the code** (0.2.0, sources aaaa)" in page(result, "bbbb").split("## Made")[0]
+
+
+def test_where_a_page_is_read_each_part_is_current_or_older() -> None:
+    result = StoredResult("test", "It is shown.", (made(NOW, ("joint", "L")), made(OLD, ("icp", "b"))))
+    fresh, earlier = answer(page(result), "aaaa").split("## Made earlier")
+    assert CURRENT in fresh
+    assert OLDER in earlier
+    assert answer(page(result), "bbbb").count(OLDER) == 2
+    assert answer_overview("| 1 mm | met | aaaa111 |", "aaaa111") == "| 1 mm | met | this version |"
+    assert answer_overview("| 1 mm | met | aaaa111 |", "bbbb111") == "| 1 mm | met | older: aaaa111 |"
 
 
 def test_notes_tell_when_the_figures_are_of_another_version() -> None:
     result = StoredResult("test", "It is shown.", (made(NOW, ("joint", "L")),))
-    assert "Written about" not in page(result, "aaaa", "<!-- about: aaaa -->\n\nIt is good.\n")
-    text = page(result, "aaaa", "<!-- about: d33d489 to 764f95f -->\n\nIt is good.\n")
+    assert "Written about" not in page(result, "<!-- about: aaaa -->\n\nIt is good.\n")
+    text = page(result, "<!-- about: d33d489 to 764f95f -->\n\nIt is good.\n")
     assert "*Written about the results of d33d489 to 764f95f:*\n\nIt is good.\n" in text
     assert "<!--" not in text
 

@@ -11,8 +11,8 @@ from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.standing.candidate import SideReach

@@ -9,8 +9,8 @@ from gtsam import Pose2, Pose3
 from drivers.core.poses import spatial, transform_points
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.motion import GraspFrame
 from tactile_lab.autonomy.planner import Reorientation
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.data.kinematic_hand import KinematicHand

@@ -1,0 +1,46 @@
+"""Arrangements of the fingertips in touches without a grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from drivers.shadow.closing.closing import Closing
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Arrangement of the fingertips in a touch.
+
+    Attributes:
+        closing: its paths.
+        progress: position on them, by finger.
+        held_rad: joint angles of fingers that are held out of the way, by finger and motor.
+    """
+
+    closing: str
+    progress: Mapping[str, float]
+    held_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def aside(self, table: Closing) -> dict[str, float]:
+        """Additional motor angles, relative to the closing's table, to hold those fingers, radians."""
+        wanted = {motor: angle for motors in self.held_rad.values() for motor, angle in motors.items()}
+        tabled = {m: a for finger in self.held_rad for m, a in table.joints(finger, self.progress[finger]).items()}
+        return {motor: wanted[motor] - angle for motor, angle in tabled.items()}
+
+
+TAP = Pattern("radial", {"FF": 0.70, "MF": 0.86, "RF": 0.78, "LF": 0.68, "TH": 0.62})
+"""Five fingertips around the middle of the grasp frame, far enough apart not to touch each other."""
+
+ROW = Pattern(
+    "pinch",
+    {"FF": 0.75, "MF": 0.75, "RF": 0.75, "LF": 0.75, "TH": 0.0},
+    {"TH": {"THJ1": 0.0, "THJ2": -0.6, "THJ3": 0.0, "THJ4": 0.0, "THJ5": -1.0}},
+)
+"""The four fingers in a row, the thumb beside them 100 mm above the table."""
+
+COLUMN = Pattern("pinch", {"FF": 0.75, "MF": 0.75, "RF": 0.75, "LF": 0.75, "TH": 0.0})
+"""The four fingers in a row; with the palm upright one above the other, the open thumb beside them."""
+
+TAP_HEIGHT_m = 0.022
+"""Height of the closing's table; the positioner adds the rest."""
