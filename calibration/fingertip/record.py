@@ -51,7 +51,7 @@ def judge_fingertip(fit: FingertipFit, limits: FingertipLimits | None = None) ->
         Judgement("left of the untouched forces", 1e3 * fit.rms_force_N, limits.force_mN, "mN"),
         Judgement("left of the presses' levers", 1e3 * fit.rms_lever_m, limits.lever_mm, "mm"),
         Judgement("forces from the plate's normal", float(np.degrees(fit.tilt_rad)), limits.tilt_deg, "deg"),
-        Judgement("noise, of what was stated", float(np.sqrt(fit.variance_factor)), limits.noise, ""),
+        Judgement("noise relative to the stated", float(np.sqrt(fit.variance_factor)), limits.noise, ""),
         Judgement("sigma of the mass", 1e3 * fit.sigma("mass"), limits.mass_g, "g"),
         Judgement("sigma of the centre of mass", 1e3 * fit.sigma("com"), limits.com_mm, "mm"),
         Judgement("sigma of the mounting", float(np.degrees(fit.sigma("mounting"))), limits.mounting_deg, "deg"),

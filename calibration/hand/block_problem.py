@@ -170,7 +170,7 @@ class BlockProblem(TouchProblem):
         }
         figures = (
             Judgement("residual", 1e3 * rms_m(self.residuals(solution)), limits.residual_mm, "mm"),
-            Judgement("noise, of what was stated", float(np.sqrt(solution.variance_factor)), limits.noise, ""),
+            Judgement("noise relative to the stated", float(np.sqrt(solution.variance_factor)), limits.noise, ""),
             Judgement("share of outliers", len(solution.outliers) / self.count, limits.outliers, ""),
         )
         return BlockResult(offsets, Covariance.from_matrix(tuple(f"{name}_rad" for name in names), spread), figures)

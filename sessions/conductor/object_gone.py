@@ -27,12 +27,12 @@ def not_found(box: BoundingBox, expected_m: Array, around_m: float, lowest_m: fl
     return (
         f"no object was found where it is expected; {box.in_words()} at {_place(expected_m)} and "
         f"{1e3 * around_m:.0f} mm around, down to {1e3 * lowest_m:.0f} mm above the table. Put the object there, or "
-        "give its place in the rig file (conductor.plan.start_m); what is lower or thinner than a fingertip is not felt"
+        "give its place in the rig file (conductor.plan.start_m); anything lower or thinner than a fingertip is not felt"
     )
 
 
 def blocked(approaches: int, landings_m: Sequence[Array]) -> str:
-    """No way down was found.
+    """Every approach was blocked.
 
     Args:
         approaches: in a row that failed.
@@ -45,8 +45,8 @@ def blocked(approaches: int, landings_m: Sequence[Array]) -> str:
     top_mm = 1e3 * max(float(place[2]) for place in landings_m)
     return (
         f"{said}; fingertips landed over {length_mm:.0f} x {width_mm:.0f} mm, up to {top_mm:.0f} mm above the table, "
-        f"and the hand straddles {1e3 * OPENING_m:.0f} mm. Turn the object or lay it on another side; with "
-        "--dimension 3 what is wider is touched instead"
+        f"while the open hand spans {1e3 * OPENING_m:.0f} mm. Turn the object or lay it on another side; with "
+        "--dimension 3 wider objects are touched instead"
     )
 
 
@@ -54,7 +54,7 @@ def lost(reason: str, grasps: Sequence[Grasp]) -> str:
     """The object is not where it was.
 
     Args:
-        reason: what tells that.
+        reason: how that was noticed.
         grasps: of the session, in order.
     """
     touched = [contact.point_world_m for grasp in grasps for contact in grasp.contacts]

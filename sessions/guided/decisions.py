@@ -62,7 +62,7 @@ class GuidedDecisions(AutonomousDecisions):
         self._entered, self._console.grasp = index, index + 1
         first = "Place the object on the table." if index == 0 else "Ready for the next grasp."
         undo = "" if index == 0 else "; u: take the last grasp back"
-        self._console.enter(Stage.PLACE, f"{first} SPACE: go on{undo}; e: end", Ask.NEXT, Ask.UNDO, Ask.END)
+        self._console.enter(Stage.PLACE, f"{first} SPACE: continue{undo}; e: end", Ask.NEXT, Ask.UNDO, Ask.END)
 
     def on_capture(self, grasp: Grasp, plan: GraspPlan) -> Reorientation | Veto:
         self._console.tell(_in_words(grasp))

@@ -82,7 +82,7 @@ class Motion:
             self._await_hand()
 
     def _await_hand(self) -> None:
-        self._log("the hand is not heard: everything waits where it is")
+        self._log("the hand is silent: motion waits until it answers")
         began_ns = self.runtime.clock.now_ns()
         while self.supervisor.hand_is_silent:
             self._watched_cycle()

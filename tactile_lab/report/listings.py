@@ -104,8 +104,8 @@ def evaluation_section(content: ReportContent) -> Markup:
     curve = calibration_curve(content.evaluation.get("consistency") or {})
     if curve is not None:
         caption = (
-            "How much of the truth is inside what is stated with a probability: on the dotted line statements are "
-            "true, below it too bold, above it too shy."
+            "Share of true values inside the stated regions, over the probability stated for them. On the dotted line "
+            "the uncertainties are true; below it they are too small, above it too large."
         )
         keys = legend([("estimate", "surface"), ("truth", "poses")])
         parts.append(element("div", figure(curve, caption, "Are the uncertainties true?", keys), class_="pair wide"))

@@ -136,7 +136,7 @@ def hand_board(rig: Rig, request: ForearmRequest) -> Board:
     file = request.board or rig.files["board"]
     if isinstance(board := load_board(file), Chessboard):
         hint = "Print another one for the hand: tactile-lab markers grid"
-        raise ConfigurationError("a chessboard does not tell which way up it is", where=str(file), hint=hint)
+        raise ConfigurationError("a chessboard looks the same upside down", where=str(file), hint=hint)
     return board
 
 

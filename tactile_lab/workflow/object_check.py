@@ -52,7 +52,7 @@ def marker_problem(runtime: RigRuntime, rig: Rig, markers: MarkerSettings) -> st
     if not problem:
         return ""
     return (
-        f"the camera cannot tell where the object is: {problem}. Grasps made like this have no true pose. The marker "
+        f"the camera cannot locate the object: {problem}. Grasps made like this have no true pose. The marker "
         f"under the object has a side of {_mm(markers.object_side_m)}: use a larger one, bring it into the picture, or "
         "clean the table"
     )

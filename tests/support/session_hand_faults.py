@@ -129,7 +129,7 @@ def _jump(hand: WatchedHand) -> None:
 
 
 def _silent(motors: range) -> SessionHandFault:
-    return SessionHandFault(lambda hand: hand.palm.faults.silent.update(motors), 0.05 + CYCLE_s, "not heard for")
+    return SessionHandFault(lambda hand: hand.palm.faults.silent.update(motors), 0.05 + CYCLE_s, "silent for")
 
 
 def _flag(flag: MotorFlag) -> SessionHandFault:

@@ -90,7 +90,7 @@ def _misses(motor: int) -> Callable[[PalmStatus], bool]:
 
 
 def _silent(motors: range) -> WireFault:
-    return WireFault("hand", {"silent": [*motors]}, "not heard for 50 ms", SILENT_AFTER_s, _misses(motors[0]))
+    return WireFault("hand", {"silent": [*motors]}, "silent for 50 ms", SILENT_AFTER_s, _misses(motors[0]))
 
 
 def _reports(kind: FromMotor, least: int) -> Callable[[PalmStatus], bool]:
@@ -154,7 +154,7 @@ ARM_FAULTS: dict[str, WireFault] = {
         "base", {"event": "stop program"}, "the program on the arm was stopped", ends=(None, {"event": "release"})
     ),
     "arm: cable unplugged": WireFault(
-        "base", {"event": "unplug"}, "not heard any more", ends=(None, {"event": "plug"})
+        "base", {"event": "unplug"}, "has stopped answering", ends=(None, {"event": "plug"})
     ),
 }
 """On sim-ur."""

@@ -69,7 +69,7 @@ def events(session: Session) -> str:
 
 def grasp(terminal: Terminal) -> None:
     """One grasp as the prompts say, up to the hold."""
-    terminal.until("SPACE: go on", " ")
+    terminal.until("SPACE: continue", " ")
     terminal.until("Move the hand", "g")
     terminal.until("Close the fingers", "g")
 

@@ -25,7 +25,7 @@ pytestmark = [
 STOPS = (
     ("protective stop", "release", "base: protective stop"),
     ("stop program", "release", "base: the program on the arm was stopped"),
-    ("unplug", "plug", "base: the arm is not heard any more"),
+    ("unplug", "plug", "base: the arm has stopped answering"),
 )
 
 

@@ -133,7 +133,7 @@ def test_an_arm_is_moved_stopped_resumed_led_and_lost(served: Served) -> None:
     served.run_until(lambda: not box.free)
 
     box.befall("unplug")
-    served.stopped_with("not heard any more; it stops by itself")
+    served.stopped_with("has stopped answering; it stops by itself")
     assert box.stopped_ns is not None  # by its own watchdog
     box.befall("plug")
 

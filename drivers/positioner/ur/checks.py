@@ -30,7 +30,7 @@ ROBOT_MODES = {
     8: "UPDATING FIRMWARE",
 }
 
-_UNLOCK = "Look at what it met, release it on the pendant, then start again"
+_UNLOCK = "Clear what the arm ran into, release it on the pendant, then start again"
 _SAFETY = (
     (0b1000000, "emergency stop at the arm", "Release the switch, then switch the arm on at the pendant"),
     (0b0100000, "emergency stop of the system", "Release the switch, then switch the arm on at the pendant"),
@@ -52,7 +52,7 @@ class Refusal:
     remedy: str
 
 
-UNHEARD = Refusal("the arm is not heard any more; it stops by itself", "Check its cable and its power")
+UNHEARD = Refusal("the arm has stopped answering; it stops by itself", "Check its cable and its power")
 
 
 def safety_stop(arm: ArmState) -> Refusal | None:
@@ -134,7 +134,7 @@ def stop_cause(arm: ArmState, settings: UrSettings) -> Refusal | None:
     force_N = float(np.linalg.norm(arm.force_N))
     if force_N > settings.force_limit_N and not arm.flags & ArmFlags.FREE:  # a person pushes harder
         what = f"force {force_N:.0f} N at the tool centre is over the limit of {settings.force_limit_N:.0f} N"
-        return Refusal(what, "See what the hand met before continuing")
+        return Refusal(what, "Check what the hand ran into before continuing")
     if not arm.flags & ArmFlags.PROGRAM:
         return Refusal("the program on the arm was stopped", "See why it was stopped on the pendant, then start again")
     if arm.flags & ArmFlags.BRAKED:

@@ -102,7 +102,7 @@ class MotorWatch:
             return None
         motors = np.flatnonzero(late).tolist()
         others = f", and {len(motors) - 1} other motors" if len(motors) > 1 else ""
-        what = f"stopped: not heard for {1000 * SILENT_AFTER_s:.0f} ms{others}"
+        what = f"stopped: silent for {1000 * SILENT_AFTER_s:.0f} ms{others}"
         hint = "Ten of one bus, or all: look at the hand's power; one: its board or connector"
         return Fault(what, self._name(motors[0]), hint)
 

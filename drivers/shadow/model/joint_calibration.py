@@ -207,10 +207,10 @@ def _refuse_typing_errors(content: _CalibrationFile, where: str) -> None:
     for joint, count, degrees in points:
         if not 0.0 <= count <= _LARGEST_count:
             what = f"the table of {joint} has {count:g} counts; its sensor reads 0 to {_LARGEST_count}"
-            raise ConfigurationError(what, where=where, hint="Correct the figure, or calibrate the joint anew")
+            raise ConfigurationError(what, where=where, hint="Correct the figure, or calibrate the joint again")
         if not abs(degrees) <= _LARGEST_deg:
             what = f"the table of {joint} has {degrees:g} degrees; no joint turns by more than {_LARGEST_deg}"
-            raise ConfigurationError(what, where=where, hint="Correct the figure, or calibrate the joint anew")
+            raise ConfigurationError(what, where=where, hint="Correct the figure, or calibrate the joint again")
 
 
 def _joint_from_sensor() -> Array:

@@ -47,7 +47,7 @@ def ros2_bridge(
         Path, typer.Option(help="Folder in which the sessions' folders are created.", callback=writable_folder)
     ] = Path("runs"),
     sessions: Annotated[
-        int, typer.Option(min=0, max=1000, help="End after so many sessions; 0: at Ctrl+C.", show_default="0")
+        int, typer.Option(min=0, max=1000, help="Number of sessions; 0: until Ctrl+C.", show_default="0")
     ] = 0,
     domain: Annotated[int, typer.Option(min=0, max=LARGEST_DOMAIN, envvar="ROS_DOMAIN_ID", help="ROS 2's domain.")] = 0,
     network: Annotated[

@@ -110,7 +110,7 @@ def _panel(cell: Cell) -> str:
 
 COVERAGE = Experiment(
     "coverage",
-    "What the default method says of its own results, on two families of simulated contacts.",
+    "Whether the uncertainties that the default method states are true, on two families of simulated contacts.",
     _settings,
     assessed_run,
     (

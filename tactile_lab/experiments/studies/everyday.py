@@ -26,7 +26,7 @@ def _panel(cell: Cell) -> str:
 
 HANDS = Experiment(
     "hands",
-    "Whole sessions of a left hand and of a Lite hand beside those of the right hand with five fingers.",
+    "Whole sessions of a left hand and of a Lite hand, compared with the right hand with five fingers.",
     everyday_sessions.settings_of_hands,
     everyday_sessions.explore_everyday,
     (

@@ -37,7 +37,7 @@ CAMERA_TRUTH = Experiment(
 
 GRAPH_STRESS = Experiment(
     "graph-stress",
-    "Pose graphs of 50 grasps with 20 % wrong loops: gtsam's solvers, ours, and one told which are right.",
+    "Pose graphs of 50 grasps with 20 % wrong loops: gtsam's solvers, ours, and an oracle that knows the right ones.",
     lambda grasps: grid(solver=[*stock_solvers(), graph_runs.OUR_SOLVER]),
     graph_runs.solve_stressed_graph,
     (
@@ -110,7 +110,7 @@ CALIBRATE_FINGERTIP = Experiment(
 
 CRASH_RECOVERY = Experiment(
     "crash-recovery",
-    "Accidents of a recording at full load, at a random instant: what is lost of it.",
+    "Crashes of a recording at full load, at random instants: what is lost.",
     lambda grasps: grid(fault=crash_runs.faults_here()),
     crash_runs.crash_and_recover,
     (

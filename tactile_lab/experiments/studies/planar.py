@@ -45,7 +45,7 @@ METHODS_2D = Experiment(
 
 CONTOUR_LIMIT = Experiment(
     "contour-limit",
-    "How well grasps can tell a polygon at all, its poses known or estimated.",
+    "The best that any estimate of a polygon can reach from these grasps, with poses known or estimated.",
     _limits_in_plane,
     contour_limit.limit_of_contour,
     (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION),

@@ -156,7 +156,7 @@ KNOWN_SHAPE = Experiment(
 
 SOLID_LIMIT = Experiment(
     "solid-limit",
-    "How well grasps can tell a solid with flat faces on a table at all, its poses known or estimated.",
+    "The best that any estimate of a flat-faced solid can reach from these grasps, with poses known or estimated.",
     _limits_on_table,
     solid_limit.limit_of_solid,
     (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION),

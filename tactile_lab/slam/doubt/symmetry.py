@@ -51,7 +51,7 @@ class Symmetry:
     def words(self) -> str:
         """The consequence, as a sentence."""
         if self.order == ROUND:
-            return "the object is round: contacts do not tell how it is turned about its axis"
+            return "the object is round: contacts cannot determine its rotation about its axis"
         return f"the object looks the same after a turn of {360 / self.order:.0f}°: its heading may be off by it"
 
     def offset(self, turns: int) -> Array:

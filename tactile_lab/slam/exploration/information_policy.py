@@ -112,7 +112,7 @@ class InformationPolicy:
 
 
 def _apart(nats: float, belief: Belief) -> str:
-    """What the chosen grasp tells about alternatives, for people; empty if there are none."""
+    """The information of the chosen grasp about alternatives, in words; empty if there are none."""
     if not belief.rivals:
         return ""
     chance = sum(rival.probability for rival in belief.rivals)
@@ -123,6 +123,6 @@ def _reason(promise: Promise, best: int, pushes: bool) -> str:
     push = ", though it may push the object" if pushes else ""
     pose = f" and {promise.pose[best]:.1f} nats about the pose" if promise.pose[best] > 0.05 else ""
     return (
-        f"{promise.touching[best]:.1f} contacts are expected to tell {promise.shape[best]:.1f} nats about the shape"
+        f"{promise.touching[best]:.1f} contacts expected, with {promise.shape[best]:.1f} nats about the shape"
         f"{pose}, {100 * promise.new_share[best]:.1f} % of the surface new{push}"
     )

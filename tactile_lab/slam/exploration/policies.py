@@ -48,7 +48,7 @@ def _igef() -> Policy:
 
 def _igef_shape() -> Policy:
     rating = igef_rating(lambda metrics: metrics.shape_only, IgefSettings())
-    return ContactsPolicy("igef-shape", rating, "its contacts are new and beside what is known (4.11, 4.13)")
+    return ContactsPolicy("igef-shape", rating, "its contacts are new and next to known surface (4.11, 4.13)")
 
 
 def _clusters_appendix() -> Policy:

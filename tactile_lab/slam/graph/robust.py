@@ -258,7 +258,7 @@ class _Problem:
         elif value > self.limit:
             reason = f"contradicts the loops that agree with each other ({words})"
         elif not supported:
-            reason = f"nothing confirms it: the poses are too uncertain there to tell it from a wrong one ({words})"
+            reason = f"unconfirmed: the poses there are too uncertain to distinguish it from a wrong loop ({words})"
         else:
             reason = f"belongs to a combination of loops that explains less ({words})"
         return LoopVerdict(accepted, value, self.limit, reason)

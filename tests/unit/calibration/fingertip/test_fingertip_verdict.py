@@ -39,7 +39,7 @@ FAULTS = [
     (replace(GOOD, rms_force_N=0.031), "left of the untouched forces", 31.0, "mN"),
     (replace(GOOD, rms_lever_m=0.0009), "left of the presses' levers", 0.9, "mm"),
     (replace(GOOD, tilt_rad=float(np.radians(31.0))), "forces from the plate's normal", 31.0, "deg"),
-    (replace(GOOD, variance_factor=4.41), "noise, of what was stated", 2.1, ""),
+    (replace(GOOD, variance_factor=4.41), "noise relative to the stated", 2.1, ""),
     (with_sigma("mass", 0.0011), "sigma of the mass", 1.1, "g"),
     (with_sigma("com", 0.0021), "sigma of the centre of mass", 2.1, "mm"),
     (with_sigma("mounting", float(np.radians(3.1))), "sigma of the mounting", 3.1, "deg"),

@@ -187,7 +187,7 @@ def test_more_noise_than_stated_widens_the_regions():
     found = fit_fingertip(data, calm)
     assert found.variance_factor > 4.0
     judged = {judgement.name: judgement for judgement in judge_fingertip(found)}
-    assert not judged["noise, of what was stated"].ok
+    assert not judged["noise relative to the stated"].ok
 
 
 def test_the_record_keeps_the_other_fingers(tmp_path):

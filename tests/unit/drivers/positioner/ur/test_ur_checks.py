@@ -66,7 +66,7 @@ def test_a_load_felt_at_rest_means_a_wrong_payload() -> None:
 @pytest.mark.parametrize(
     ("arm", "words"),
     [
-        (replace(READY, flags=ArmFlags.PROGRAM), "not heard any more"),
+        (replace(READY, flags=ArmFlags.PROGRAM), "has stopped answering"),
         (replace(READY, safety_bits=0b10000000), "emergency stop"),
         (replace(READY, flags=ArmFlags.HEARD), "the program on the arm was stopped"),
         (replace(READY, force_N=(50.0, 0.0, 50.0)), "force 71 N at the tool centre is over the limit of 60 N"),
