@@ -15,7 +15,7 @@ from gtsam import Pose3, Rot3
 from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 from tactile_lab.evaluation.trajectory import Poses
-from tactile_lab.slam.doubt.symmetry import ROUND, Symmetry, symmetry_of
+from tactile_lab.slam.doubt.symmetry import ROUND, Symmetry, largest_order, symmetry_of
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh
 from tactile_lab.slam.shape.surfaces.surface import Contour
 
@@ -23,7 +23,6 @@ ANY_TURN = ROUND
 ORIGIN_m = np.zeros(2)
 
 _FEWEST = 6
-_MOST = 12
 _SOME_TURNS_rad = np.deg2rad([7.0, 20.0, 45.0, 77.0, 131.0])
 """None of these rotations maps a prism of up to twelve sides to itself."""
 _ALIKE_m = 0.001
@@ -47,7 +46,7 @@ def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
 
     if all(map(stays, _SOME_TURNS_rad)):
         return ANY_TURN
-    return next((number for number in range(_MOST, _FEWEST - 1, -1) if stays(2 * np.pi / number)), None)
+    return largest_order(stays, _FEWEST)
 
 
 def outline_symmetry(outline_m: Array) -> Symmetry | None:

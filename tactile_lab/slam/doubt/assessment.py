@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tactile_lab.slam.doubt.halves import exchanged
-from tactile_lab.slam.doubt.known_part import known_part, with_guesses_told
+from tactile_lab.slam.doubt.known_part import REACH_ALONE_m, REACH_m, known_part, with_guesses_told
 from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, turned_by_symmetry
 from tactile_lab.slam.doubt.signs import signs
 from tactile_lab.slam.doubt.sizes import unknown_sizes
@@ -75,7 +75,9 @@ def assess(
     share = None
     if shape is not None:
         stands = settings.freedom == "table"
-        part = known_part(shape, contact_map.contacts, -origin_height_m if stands else None)
+        floor_m = -origin_height_m if stands else None
+        reach_m = REACH_m if sum(grasp.used for grasp in contact_map.placed) >= LEAST_GRASPS else REACH_ALONE_m
+        part = known_part(shape, contact_map.contacts, floor_m, reach_m=reach_m)
         shape, share = with_guesses_told(shape, part), part.share
     symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= LEAST_KNOWN_SHARE else None
     if has_ended:

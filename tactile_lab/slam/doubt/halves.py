@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 from tactile_lab.slam.doubt.status import Doubt
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tactile_lab.slam.tracking.joint.proposals import UNEXPLAINED_COST
 
 LEAST_nats = 0.3
 """Gain for each contact of the smaller part. Where it is least, 22 single objects with 14 to 16 grasps at their true
@@ -32,6 +33,14 @@ _LEAST_SHARED = 0.1
 that were touched one after the other; but nothing says so.
 """
 
+_LOOSE_SHARED, _LOOSE_GRASPS = 0.3, 4
+"""Two parts of so many grasps or more that share less hang together by the hand's motion alone. Of whole trajectories
+that are right they share three quarters and more; one that drifts away from its beginning touches new places for ever.
+"""
+
+_MOST_STRAYS = 0.05
+"""Share of the contacts that are put aside at most: of two objects in one log many more do not fit."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -41,18 +50,21 @@ class Step:
         grasp: the first one after it, from 0.
         gain_nats: by which the evidence of all exceeds that of both parts, for each contact of the smaller one.
         shared: share of the smaller part's contacts near contacts of the other.
+        grasps: number of grasps of the shorter part.
     """
 
     grasp: int
     gain_nats: float
     shared: float
+    grasps: int
 
 
 def exchanged(contact_map: ContactMap) -> list[Doubt]:
-    """The doubt that another object was touched from some grasp on; none if all foretell each other."""
-    worst = min(_steps(contact_map), key=lambda step: step.gain_nats, default=None)
+    """The doubt that another object was touched from some grasp on, or that nothing ties two parts together."""
+    steps = _steps(_without_strays(contact_map))
+    worst = min(steps, key=lambda step: step.gain_nats, default=None)
     if worst is None or worst.gain_nats >= LEAST_nats:
-        return []
+        return loose(steps)
     if worst.shared < _LEAST_SHARED:
         words = (
             f"nothing that was touched before was touched again from grasp {worst.grasp + 1} on: is it another object?"
@@ -60,6 +72,33 @@ def exchanged(contact_map: ContactMap) -> list[Doubt]:
     else:
         words = f"contacts before and from grasp {worst.grasp + 1} on do not fit each other: is it another object?"
     return [Doubt("other-object", words, tuple(range(worst.grasp, len(contact_map.placed))))]
+
+
+def loose(steps: list[Step]) -> list[Doubt]:
+    """The doubt that two parts of the trajectory hardly share a place of the object."""
+    long_enough = [step for step in steps if step.grasps >= _LOOSE_GRASPS]
+    loosest = min(long_enough, key=lambda step: step.shared, default=None)
+    if loosest is None or loosest.shared >= _LOOSE_SHARED:
+        return []
+    words = (
+        f"only {loosest.shared:.0%} of the contacts before or from grasp {loosest.grasp + 1} on are near the others: "
+        "how the two parts lie to each other rests on the hand's motion alone"
+    )
+    return [Doubt("loose-parts", words, (loosest.grasp,))]
+
+
+def _without_strays(contact_map: ContactMap) -> ContactMap:
+    """The map without a few contacts that its field does not explain, the worst first.
+
+    A pair of wrong contacts that flat faces put up with costs a field of all contacts as much as another object does;
+    fields of the parts, with one of the pair each, bulge there at little cost.
+    """
+    for _ in range(int(_MOST_STRAYS * len(contact_map.contacts))):
+        costs = contact_map.fit().leave_one_out_costs(np.arange(len(contact_map.contacts)))
+        if costs.max() <= UNEXPLAINED_COST:
+            break
+        contact_map = contact_map.without_contact(*contact_map.origins[int(costs.argmax())])
+    return contact_map
 
 
 def _steps(contact_map: ContactMap) -> list[Step]:
@@ -76,7 +115,7 @@ def _step(contact_map: ContactMap, before: list[int], after: list[int]) -> Step:
     parts = [_part(contact_map, before), _part(contact_map, after)]
     smaller, larger = sorted((part.contacts for part in parts), key=len)
     gain = _evidence(_part(contact_map, before + after)) - sum(_evidence(part) for part in parts)
-    return Step(after[0], gain / len(smaller), _share_near(smaller, larger))
+    return Step(after[0], gain / len(smaller), _share_near(smaller, larger), min(len(before), len(after)))
 
 
 def _part(contact_map: ContactMap, grasps: list[int]) -> ContactMap:

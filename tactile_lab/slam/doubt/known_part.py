@@ -12,6 +12,8 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.spatial.distance import cdist
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.surfaces.surface import Contour, LEVEL_SIGMA_m, SurfaceMesh
@@ -23,14 +25,17 @@ _Shape = TypeVar("_Shape", bound=Contour | SurfaceMesh)
 REACH_m = 0.040
 """A contact tells about the surface up to here. Thirty contacts all over a hand-sized object know all of it."""
 
+REACH_ALONE_m = 0.010
+"""The same of one grasp or two, whose contacts hardly confirm each other: a corner may be between any two of them."""
+
 LARGEST_ANGLE_rad = float(np.deg2rad(60.0))
 """Between a contact's normal and the surface's: contacts of one face tell nothing of the faces beside it."""
 
 LARGEST_SIGMA_m = 0.005
 """Where the shape is less certain than this it is only interpolated between contacts."""
 
-_BLOCK = 2000
-"""Number of points of a surface that are compared with all contacts at once."""
+_BLOCK = 100
+"""Number of contacts that are compared with all of a surface at once."""
 
 _DOWN = -0.95
 
@@ -51,20 +56,24 @@ class KnownPart:
     distances_m: Array
 
 
-def known_part(shape: Contour | SurfaceMesh, contacts: ContactSet, floor_m: float | None = None) -> KnownPart:
+def known_part(
+    shape: Contour | SurfaceMesh, contacts: ContactSet, floor_m: float | None = None, *, reach_m: float = REACH_m
+) -> KnownPart:
     """The part of an outline or surface that contacts support.
 
     Args:
         shape: object frame.
         contacts: those that the estimate uses, object frame, of the shape's dimension.
         floor_m: height of the table under a standing object, object frame; None for an object held free.
+        reach_m: how far from a contact the surface is known.
     """
-    points, normals, sizes = _outline(shape) if isinstance(shape, Contour) else _surface(shape)
-    distances = _nearest_alike(points, normals, contacts)
-    known = (distances < REACH_m) & (shape.sigma_m <= LARGEST_SIGMA_m)
+    sides = _outline(shape) if isinstance(shape, Contour) else _surface(shape)
+    points, normals = sides.points_m, sides.normals
+    distances = _nearest_alike(sides, contacts)
+    known = (distances < reach_m) & (shape.sigma_m <= LARGEST_SIGMA_m)
     if floor_m is not None and isinstance(shape, SurfaceMesh):
         known |= (points[:, 2] < floor_m + LEVEL_SIGMA_m) & (normals[:, 2] < _DOWN)
-    share = float(sizes @ known / max(float(sizes.sum()), 1e-12))
+    share = float(sides.sizes @ known / max(float(sides.sizes.sum()), 1e-12))
     return KnownPart(known, min(share, 1.0), distances)
 
 
@@ -78,28 +87,58 @@ def with_guesses_told(shape: _Shape, part: KnownPart) -> _Shape:
     return replace(shape, sigma_m=sigma_m, known=part.known)
 
 
-def _outline(contour: Contour) -> tuple[Array, Array, Array]:
-    """Points of an outline, their outward normals, and the length that belongs to each."""
-    lengths = np.linalg.norm(np.roll(contour.points_m, -1, axis=0) - contour.points_m, axis=1)
-    return contour.points_m, contour.normals, (lengths + np.roll(lengths, 1)) / 2
+@dataclass(frozen=True)
+class _Sides:
+    """Points of a shape with the flat pieces that meet there: at a sharp corner none of these faces as the point does.
+
+    Attributes:
+        points_m: shape (n, d).
+        normals: outward, at the points, shape (n, d).
+        sizes: length or area that belongs to each point, shape (n,).
+        piece_normals: outward, shape (m, d).
+        meet: which pieces meet at which point, shape (n, m), sparse.
+    """
+
+    points_m: Array
+    normals: Array
+    sizes: Array
+    piece_normals: Array
+    meet: csr_array
 
 
-def _surface(mesh: SurfaceMesh) -> tuple[Array, Array, Array]:
-    """Vertices of a surface, their outward normals, and the area that belongs to each."""
-    corners = mesh.vertices[mesh.faces]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 6
-    sizes = np.bincount(mesh.faces.ravel(), weights=np.repeat(areas, 3), minlength=len(mesh.vertices))
-    return mesh.vertices, mesh.normals, np.asarray(sizes, dtype=float)
+def _outline(contour: Contour) -> _Sides:
+    count = len(contour.points_m)
+    edges = np.roll(contour.points_m, -1, axis=0) - contour.points_m
+    lengths = np.linalg.norm(edges, axis=1)
+    outward = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.maximum(lengths, 1e-12)[:, None]
+    each = np.arange(count)
+    meet = _meeting(np.concatenate([each, each]), np.concatenate([each, each - 1]) % count, (count, count))
+    return _Sides(contour.points_m, contour.normals, (lengths + np.roll(lengths, 1)) / 2, outward, meet)
 
 
-def _nearest_alike(points: Array, normals: Array, contacts: ContactSet) -> Array:
-    """Distance of each point to the nearest contact with a similar normal, at most :data:`REACH_m`."""
-    nearest = np.full(len(points), REACH_m)
-    if len(contacts) == 0:
-        return nearest
-    for first in range(0, len(points), _BLOCK):
+def _surface(mesh: SurfaceMesh) -> _Sides:
+    corners, count = mesh.vertices[mesh.faces], len(mesh.vertices)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(across, axis=1)
+    sizes = np.bincount(mesh.faces.ravel(), weights=np.repeat(doubled / 6, 3), minlength=count)
+    pieces = np.repeat(np.arange(len(mesh.faces)), 3)
+    meet = _meeting(mesh.faces.ravel(), pieces, (count, len(mesh.faces)))
+    outward = across / np.maximum(doubled, 1e-12)[:, None]
+    return _Sides(mesh.vertices, mesh.normals, np.asarray(sizes, dtype=float), outward, meet)
+
+
+def _meeting(points: NDArray[np.intp], pieces: NDArray[np.intp], shape: tuple[int, int]) -> csr_array:
+    return csr_array((np.ones(len(points), dtype=np.float32), (points, pieces)), shape=shape)
+
+
+def _nearest_alike(sides: _Sides, contacts: ContactSet) -> Array:
+    """Distance of each point to the nearest contact on a side that faces the same way, at most :data:`REACH_m`."""
+    nearest, least = np.full(len(sides.points_m), REACH_m), np.cos(LARGEST_ANGLE_rad)
+    for first in range(0, len(contacts), _BLOCK):
         block = slice(first, first + _BLOCK)
-        gaps = np.linalg.norm(points[block, None] - contacts.points_m[None], axis=2)
-        gaps[normals[block] @ contacts.normals.T < np.cos(LARGEST_ANGLE_rad)] = np.inf
-        nearest[block] = np.minimum(nearest[block], gaps.min(axis=1))
-    return nearest
+        facing = contacts.normals[block].T
+        alike = (sides.meet @ (sides.piece_normals @ facing >= least).astype(np.float32)) > 0
+        alike |= sides.normals @ facing >= least
+        gaps = np.where(alike, cdist(sides.points_m, contacts.points_m[block]), np.inf)
+        nearest = np.minimum(nearest, gaps.min(axis=1))
+    return np.asarray(nearest)

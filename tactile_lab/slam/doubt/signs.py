@@ -27,10 +27,23 @@ _UNDONE_COSINE = -0.7
 _UNLIKELY = 5e-4
 """Probability of a slip under the motion model below which it is told."""
 
+_INCREDIBLE = 1e-6
+"""The same below which it is grave although whole grasps confirm both places: slips have heavier tails than the model,
+and one of five standard deviations happens to right trajectories too.
+"""
+
+_CONFIRMING = 4
+"""Contacts of a grasp that fit where it is, at least, to confirm its place."""
+
 _JUMP_m = 0.100
 _OTHER_OBJECT = 1e-4
 _LEAST_GRASPS = 3
 """On each side of the grasp from which on another object may have been touched."""
+
+_STRAY_SHARE = 0.18
+"""Share of contacts that fit nothing from which on it is told. Where a tenth are wrong chance reaches it once in a
+hundred sessions.
+"""
 
 _GRAVE_FIRST = 2
 """So many wrong contacts of the first grasp make the object frame itself doubtful; a single one is only told."""
@@ -46,7 +59,7 @@ def signs(contact_map: ContactMap, noise: MotionNoise, *, poses_given: bool = Fa
     """
     about_motion: tuple[Callable[[ContactMap, MotionNoise], list[Doubt]], ...] = (_undone, _unlikely, _jumps)
     found = [] if poses_given else [doubt for sign in about_motion for doubt in sign(contact_map, noise)]
-    return (*found, *_other_object(contact_map), *_first_grasp(contact_map))
+    return (*found, *(_other_object(contact_map) or _strays(contact_map)), *_first_grasp(contact_map))
 
 
 def _slips(contact_map: ContactMap, noise: MotionNoise) -> tuple[Array, Array]:
@@ -75,11 +88,14 @@ def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
 def _unlikely(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     slips, bound = _slips(contact_map, noise)
     probabilities = chi2.sf(np.sum(slips**2, axis=1), contact_map.space.size)
+    confirmed = np.array([len(grasp.kept) >= _CONFIRMING for grasp in contact_map.placed])
+    doubtful = (probabilities < _INCREDIBLE) | ~(confirmed[1:] & confirmed[:-1])
     return [
         Doubt(
             "unlikely-slip",
             f"the slip before grasp {step + 2} is improbable ({probabilities[step]:.0e})",
             (int(step) + 1,),
+            grave=bool(doubtful[step]),
         )
         for step in np.flatnonzero((probabilities < _UNLIKELY) & bound)
     ]
@@ -120,6 +136,17 @@ def _other_object(contact_map: ContactMap) -> list[Doubt]:
         return []
     words = f"contacts before and from grasp {split + 1} on do not fit one object: was it exchanged, moved or deformed?"
     return [Doubt("other-object", words, tuple(range(split, count)))]
+
+
+def _strays(contact_map: ContactMap) -> list[Doubt]:
+    """Whether more contacts fit nothing than sensors get wrong: then some grasps are elsewhere."""
+    used = [grasp for grasp in contact_map.placed if grasp.used]
+    wrong = sum(len(grasp.left_out) for grasp in used)
+    total = sum(len(grasp.contacts_world) for grasp in used)
+    if wrong <= _STRAY_SHARE * total:
+        return []
+    words = f"{wrong} of {total} contacts fit nothing else: some grasps are probably placed wrongly"
+    return [Doubt("stray-contacts", words)]
 
 
 def _first_grasp(contact_map: ContactMap) -> list[Doubt]:

@@ -21,6 +21,8 @@ DoubtName: TypeAlias = Literal[
     "unlikely-slip",
     "jump",
     "other-object",
+    "loose-parts",
+    "stray-contacts",
     "first-grasp",
     "refused-grasps",
     "few-grasps",

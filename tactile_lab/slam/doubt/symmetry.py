@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,8 +95,23 @@ def symmetry_of(shape: Contour | SurfaceMesh, alike_m: float = ALIKE_m) -> Symme
 
     if all(map(stays, _SOME_TURNS_rad)):
         return Symmetry(ROUND, centre)
-    order = next((number for number in range(_MOST, 1, -1) if stays(2 * np.pi / number)), None)
+    order = largest_order(stays)
     return None if order is None else Symmetry(order, centre)
+
+
+def largest_order(stays: Callable[[float], bool], fewest: int = 2) -> int | None:
+    """The largest number of equal turns that each leave a shape as it is; None if there are not so many as the fewest.
+
+    All of them are tried: an octagon looks nearly the same after one ninth of a turn, and not after two.
+
+    Args:
+        stays: whether the shape is the same after a turn (rad).
+        fewest: orders from here on count.
+    """
+    for order in range(_MOST, fewest - 1, -1):
+        if all(stays(2 * np.pi * turns / order) for turns in range(1, order // 2 + 1)):
+            return order
+    return None
 
 
 def _samples(shape: Contour | SurfaceMesh) -> tuple[Array, Array]:

@@ -39,6 +39,13 @@ def test_what_turns_leave_an_object_as_it_is(name: str, turns: int | None) -> No
     assert symmetry_turns(solid(name).mesh) == turns
 
 
+def test_eighths_of_a_turn_leave_an_octagon_as_it_is_and_ninths_do_not() -> None:
+    angles = 2 * np.pi * np.arange(8) / 8
+    found = outline_symmetry(0.042 * np.column_stack([np.cos(angles), np.sin(angles)]))
+    assert found is not None
+    assert found.order == 8
+
+
 def test_a_dented_can_is_round(lab_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(DATA_VARIABLE, str(lab_data))
     assert symmetry_turns(solid("ycb:tomato_soup_can").mesh) == ANY_TURN

@@ -81,6 +81,10 @@ def test_one_grasp_is_partial_because_nothing_confirms_it() -> None:
     result = result_of(grasps_on((0, 1, 2, 3), seed=4, count=1))
     assert result.status == "partial"
     assert any("nothing confirms the shape" in doubt.words for doubt in result.doubts)
+    assert result.contour is not None
+    assert result.known_share is not None
+    assert result.known_share < 0.8
+    assert np.quantile(result.contour.sigma_m, 0.95) > 0.010
 
 
 @pytest.mark.long

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tactile_lab.slam.doubt.halves import exchanged
+from tactile_lab.slam.doubt.halves import Step, exchanged, loose
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tests.support.simulated_contacts import true_map
 
@@ -36,6 +36,24 @@ def test_another_object_is_told_with_its_first_grasp(beside_m: float, words: str
     assert (told.name, told.grasps, told.grave) == ("other-object", tuple(range(7, 14)), True)
     assert words in told.words
     assert "grasp 8" in told.words
+
+
+def test_two_wrong_contacts_that_contradict_each_other_are_not_another_object() -> None:
+    best = true_map("rectangle", 31, 12)
+    for grasp, inwards_m in ((2, 0.02), (9, 0.02)):
+        world = best.placed[grasp].contacts_world
+        points = world.points_m.copy()
+        points[0] -= inwards_m * world.normals[0] * (1 if grasp == 2 else -1)
+        best = best.with_placed(grasp, replace(best.placed[grasp], contacts_world=replace(world, points_m=points)))
+    assert exchanged(kernel_of(best)) == []
+
+
+def test_a_trajectory_that_never_comes_back_is_told_to_hang_on_the_hands_motion() -> None:
+    steps = [Step(4, 0.9, 0.8, 4), Step(6, 0.8, 0.2, 6), Step(9, 0.8, 0.1, 3)]
+    (told,) = loose(steps)
+    assert (told.name, told.grasps, told.grave) == ("loose-parts", (6,), True)
+    assert "from grasp 7 on" in told.words
+    assert loose(steps[::2]) == []
 
 
 def test_too_few_grasps_on_one_side_tell_nothing() -> None:

@@ -38,6 +38,15 @@ def test_a_contact_tells_of_its_own_face_only(faces: tuple[tuple[Array, Array], 
     assert known_part(outline(), touched(*faces)).share == pytest.approx(share, abs=0.03)
 
 
+def test_the_tip_of_a_wedge_is_known_from_both_its_faces() -> None:
+    wedge = sample_polygon(1e-3 * np.array([[0.0, 0.0], [60.0, -15.0], [60.0, 15.0]]), 0.001)
+    normals = np.array([[-15.0, -60.0], [-15.0, 60.0]]) / np.hypot(15.0, 60.0)
+    points = 1e-3 * np.array([[20.0, -5.0], [20.0, 5.0]])
+    contacts = ContactSet(points, normals, np.full(2, 0.001), np.full(2, 0.087))
+    part = known_part(Contour(wedge, np.full(len(wedge), 0.001), is_closed=True), contacts)
+    assert part.known[np.linalg.norm(wedge, axis=1).argmin()]
+
+
 def test_nothing_is_known_without_contacts_or_where_the_shape_is_uncertain() -> None:
     nothing = ContactSet(np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0))
     assert known_part(outline(), nothing).share == 0.0

@@ -30,6 +30,7 @@ def contour(points_m: np.ndarray) -> Contour:
     [
         (regular(3), 3),
         (regular(6), 6),
+        (regular(8), 8),
         (regular(60), ROUND),
         (OUTLINES_m["square"], 4),
         (OUTLINES_m["rectangle"], 2),

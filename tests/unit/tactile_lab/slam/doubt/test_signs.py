@@ -52,7 +52,7 @@ def test_a_grasp_turned_the_wrong_way_round_needs_two_slips_that_undo_each_other
 
 def test_a_slip_beyond_the_motion_model_is_told_once(true: ContactMap) -> None:
     found = signs(turned(true, slice(6, None), (0.06, 0.0, 0.0)), NOISE)
-    assert [(doubt.name, doubt.grasps) for doubt in found] == [("unlikely-slip", (6,))]
+    assert [(doubt.name, doubt.grasps, doubt.grave) for doubt in found] == [("unlikely-slip", (6,), True)]
 
 
 def test_a_jump_of_ten_centimetres_is_told(true: ContactMap) -> None:
@@ -70,6 +70,21 @@ def test_contacts_that_fit_up_to_some_grasp_only_are_of_another_object(true: Con
     (found,) = signs(leaving_out(true, range(7, 12), 3), NOISE)
     assert (found.name, found.grasps) == ("other-object", (7, 8, 9, 10, 11))
     assert names(leaving_out(true, range(1, 12, 3), 2)) == set()
+
+
+def test_more_contacts_that_fit_nothing_than_sensors_get_wrong_are_told(true: ContactMap) -> None:
+    (found,) = [doubt for doubt in signs(leaving_out(true, range(1, 12, 2), 2), NOISE) if doubt.name != "first-grasp"]
+    assert (found.name, found.grave) == ("stray-contacts", True)
+    assert "12 of 56 contacts" in found.words
+    assert names(leaving_out(true, range(1, 12, 2), 1)) == set()
+
+
+def test_an_unlikely_slip_between_grasps_that_confirm_their_places_is_only_told(true: ContactMap) -> None:
+    slipped = turned(true, slice(4, None), (0.04, 0.0, 0.0))
+    (slip,) = signs(slipped, NOISE)
+    (unconfirmed,) = signs(leaving_out(slipped, range(4, 5), 2), NOISE)
+    assert (slip.name, slip.grave) == ("unlikely-slip", False)
+    assert (unconfirmed.name, unconfirmed.grave) == ("unlikely-slip", True)
 
 
 def test_wrong_contacts_of_the_first_grasp_are_told_and_two_are_grave(true: ContactMap) -> None:
