@@ -25,6 +25,12 @@ from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisSco
 REACH = 0.05
 """Probability of all alternatives together from which an estimate is ambiguous."""
 
+_TRUST = 0.5
+"""Share of the difference of two costs that counts. The evidence takes errors of contacts and slips as independent and
+normal, which they are not quite: a trajectory with a grasp placed wrongly may be more likely than the true one by five
+nats, and right ones hardly have a rival within seven.
+"""
+
 _GRAVE_m = 0.003
 """An alternative that displaces contacts by less, root mean square, is told but does not make the estimate ambiguous:
 one grasp of sixteen that is a centimetre off changes neither the shape nor the rest of the trajectory.
@@ -63,7 +69,7 @@ def alternatives(
         turned_only = symmetry is not None and symmetry.interchangeable and _all_turns(best, rows, moved, symmetry)
         if moved and not turned_only and all(moved != known for known, *_ in different):
             different.append((moved, rows, max(gap, 0.0)))
-    weights = np.exp([-gap for *_, gap in different])
+    weights = np.exp([-_TRUST * gap for *_, gap in different])
     probabilities = weights / (1.0 + weights.sum())
     made = [
         _alternative(best, moved, rows, float(chance), origin_height_m)

@@ -19,6 +19,7 @@ Status: TypeAlias = Literal["complete", "partial", "ambiguous", "lost"]
 DoubtName: TypeAlias = Literal[
     "undone-slips",
     "unlikely-slip",
+    "large-slips",
     "jump",
     "other-object",
     "loose-parts",

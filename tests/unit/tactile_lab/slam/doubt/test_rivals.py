@@ -65,7 +65,7 @@ def test_rivals_are_told_with_their_grasps_and_probabilities() -> None:
     hopeless = moved(best, slice(9, 10), np.array([0.03, 0.0, 0.0]))
     found = alternatives(best, [(hopeless, 9.0), (same, 0.0), (one, 2.0), (run, 0.5)], None, 0.0)
     assert [each.grasps for each in found] == [(0, 1, 2, 3), (7,)]
-    weights = np.exp([-0.5, -2.0, -9.0])
+    weights = np.exp([-0.25, -1.0, -4.5])
     assert found[0].probability == pytest.approx(weights[0] / (1 + weights.sum()))
     assert found[1].shift_m == pytest.approx(0.03)
     (doubt,) = doubts_of(found)
