@@ -8,7 +8,7 @@ from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.studies import (
     ablation,
-    coverage,
+    consistency,
     everyday,
     exploration,
     laboratory,
@@ -30,7 +30,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         solids.SOLID_LIMIT,
         solids.METHODS_6DOF,
         ablation.ABLATION,
-        coverage.COVERAGE,
+        consistency.CONSISTENCY,
         planar.CONTOUR_LIMIT,
         planar.RANDOM_CONTACTS,
         thesis_figures.FIGURE_2_7,

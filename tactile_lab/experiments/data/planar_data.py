@@ -7,7 +7,7 @@ the same data for one shape, noise and seed. Noise as in :mod:`tactile_lab.exper
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from gtsam import Pose2, Pose3
@@ -88,11 +88,6 @@ def simulate(
         if index == 0 and contacts:
             body_T_frame = world_T_body.between(planar_pose(grasps[0].points_world_m.mean(axis=0)))
     return PlanarGrasps(shape, tuple(grasps), tuple(truth), outline_m)
-
-
-def without_paths(data: PlanarGrasps) -> PlanarGrasps:
-    """The same session, the fingers' approach paths unknown."""
-    return replace(data, grasps=tuple(replace(grasp, approach_paths=()) for grasp in data.grasps))
 
 
 def random_contacts(shape: str, count: int, seed: int) -> PlanarGrasps:

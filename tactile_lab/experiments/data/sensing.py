@@ -6,7 +6,8 @@ Default noise: contacts 1 mm and 5 degrees; motion 10 mm per axis and 20 degrees
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from gtsam import Pose2, Pose3
@@ -38,6 +39,14 @@ class SimulatedGrasps:
     shape: str
     grasps: tuple[Grasp, ...]
     world_T_body: tuple[Pose3, ...]
+
+
+_Data = TypeVar("_Data", bound=SimulatedGrasps)
+
+
+def without_paths(data: _Data) -> _Data:
+    """The same session, the fingers' approach paths unknown."""
+    return replace(data, grasps=tuple(replace(grasp, approach_paths=()) for grasp in data.grasps))
 
 
 def measured_contact(

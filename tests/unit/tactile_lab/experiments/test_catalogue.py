@@ -25,7 +25,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "known-shape": ({"shape": ["cylinder"]}, 3),
     "methods-6dof": ({"shape": ["ellipsoid"], "method": ["known-pose", "icp"]}, 4),
     "ablation": ({"shape": ["ellipse"], "condition": ["in the plane"], "without": ["nothing", "faces", "splicing"]}, 4),
-    "coverage": ({"shape": ["wedge"], "dimension": ["2"], "wrong": ["0"]}, 4),
+    "consistency": ({"shape": ["wedge"], "dimension": ["2"], "wrong": ["0"]}, 4),
     "random-contacts": ({"shape": ["L"], "contacts": ["20"], "model": ["TP, normals", "chosen by evidence"]}, None),
     "figure-2.7": ({"shape": ["ellipse"], "contacts": ["5", "10"], "model": ["SE, normals"]}, None),
     "figure-2.12": ({"contacts": ["20"], "model": ["Matérn, normals"]}, None),
