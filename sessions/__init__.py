@@ -1,1 +1,1 @@
-"""Recording, replaying and conducting sessions, whoever estimates and decides."""
+"""Recording, replaying and conducting sessions, with any estimator and any decision maker."""

@@ -1,7 +1,7 @@
 """Hand-eye calibration from pairs of poses, as other programs record them: without corners, with unknown noise.
 
 The other program took the target's printed size for granted. A print of another size scales all its distances alike,
-and shifts the answer by millimetres without a residual that tells; so the print's scale is an unknown, with a prior.
+and shifts the answer by millimetres without a visible residual; so the print's scale is an unknown, with a prior.
 """
 
 from __future__ import annotations

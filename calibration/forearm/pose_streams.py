@@ -1,6 +1,6 @@
 """Streams of poses that two programs recorded on clocks of their own: the hand's, and the target's in the camera.
 
-The target is fixed to the hand, so that both turn equally fast at any moment, whatever frames they are told in. This
+The target is fixed to the hand, so that both turn equally fast at any moment, whatever their frames. This
 gives the delay between the clocks to a fraction of a second before anything else is known.
 """
 

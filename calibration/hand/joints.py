@@ -195,7 +195,7 @@ def joints_record(
         method, here, notes: for the record.
         trusted: whether what the corrections were found from kept to its own limits.
         limits: of the joints.
-        offsets: all joints that contacts were asked for, those that they do not tell too.
+        offsets: all joints that were to be calibrated, including those that the contacts do not determine.
         covariance: of those offsets.
 
     Raises:

@@ -29,7 +29,7 @@ class MotionNeeds(StrictModel):
         rotation_rad: largest rotation between two poses.
         second_axis_rad: rotation about a second axis, root mean square over all pairs of poses.
         touches: touches.
-        direction: smallest share of the touches that tells a direction of space (the mean squared cosine).
+        direction: smallest share of the touches that determines a direction of space (the mean squared cosine).
         lever_m: root mean square lever of the touches about each axis through their middle.
         turn_rad: rotation of the hand between touches, root mean square: it separates joint offsets from the mount.
     """

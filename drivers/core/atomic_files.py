@@ -64,7 +64,7 @@ def refuse_unwritable_folder(target: Path) -> None:
 
 
 def _refuse_closed(folder: Path, target: Path, hint: str) -> None:
-    """Permissions alone do not tell: a nameless file is made in the nearest folder there is."""
+    """Permissions alone do not suffice: a nameless file is made in the nearest folder there is."""
     try:
         nearest = next(place for place in (folder, *folder.parents) if os.path.lexists(place))
         if not nearest.is_dir():

@@ -168,7 +168,7 @@ def plain_words(message: str) -> str:
 
 
 def _names(words: str, value: Any) -> bool:
-    """Whether words of our own tell the offending value already."""
+    """Whether our own message quotes the offending value already."""
     return (f"{value:g}" if isinstance(value, (int, float)) else str(value)) in words
 
 

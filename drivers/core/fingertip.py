@@ -89,7 +89,7 @@ class TipTouches:
 
 @runtime_checkable
 class ContinuousFingertip(Protocol):
-    """A fingertip that tells its contact at any moment, also while it moves (a force sensor does)."""
+    """A fingertip that measures its contact at any moment, also while it moves (a force sensor does)."""
 
     def reading(self) -> Array:
         """The newest measurement without bias, shape (6,), sensor frame; NaN if it is invalid."""

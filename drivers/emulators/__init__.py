@@ -1,1 +1,1 @@
-"""Emulators at the far end of real wires: independent masters and clients cannot tell them from real devices."""
+"""Emulators at the far end of real wires: independent masters and clients cannot distinguish them from real devices."""

@@ -54,7 +54,7 @@ class PalmFingertip(FingertipSensor, Protocol):
 
 @dataclass(frozen=True)
 class TipReport:
-    """What ``rig check`` tells of one fingertip.
+    """The report of ``rig check`` on one fingertip.
 
     Attributes:
         problems: what speaks against using it, in words.
@@ -104,7 +104,7 @@ class FingertipKind(ABC, Generic[Calibration]):
         return None
 
     def report(self, tip: FingertipSensor, names: TactileNames, serial: str) -> TipReport:
-        """What there is to tell beside the sensor's own health.
+        """Further findings, besides the sensor's own health.
 
         Args:
             tip: a sensor of this kind that has listened for a moment.
@@ -142,7 +142,7 @@ class PalmKind(FingertipKind[Calibration]):
     """The readings come with the hand's samples.
 
     Attributes:
-        tactile: what the palm is told to ask for, see :data:`drivers.shadow.device.tactile_requests.ROTATIONS`.
+        tactile: what the palm requests, see :data:`drivers.shadow.device.tactile_requests.ROTATIONS`.
     """
 
     tactile: str

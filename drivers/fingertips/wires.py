@@ -34,7 +34,7 @@ class WireKind(ABC, Generic[Settings]):
 
     @abstractmethod
     def decoder(self, settings: Settings, folder: Path) -> ForceWire:
-        """How the bytes are read, and what the device is told.
+        """How bytes are decoded, and what is sent to the device.
 
         Args:
             folder: of the rig file.

@@ -76,7 +76,7 @@ class Batch:
         payloads: their bytes.
         walls_ns: when they arrived, wall clock, shape (n,); 0 where the kernel did not say.
         hosts, ports: of the senders, shape (n,); an IPv4 address as a number.
-        drops: datagrams the socket has dropped since it was opened, as told with the newest; None when not told.
+        drops: datagrams the socket has dropped since it was opened, as stated with the newest; None if not stated.
     """
 
     payloads: list[bytes]

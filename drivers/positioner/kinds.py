@@ -1,6 +1,6 @@
 """All kinds of positioners by the name that rig files call them.
 
-Every kind is commanded and tells its place in the same six coordinates of the mount (metres and radians, see
+Every kind is commanded and reports its position in the same six coordinates of the mount (metres and radians, see
 :mod:`drivers.positioner.kinematics`), so that planning, calibration and replay know no other; a robot with other joints
 does its inverse kinematics in its driver.
 """
@@ -97,7 +97,7 @@ class PositionerKind:
         device: from a transport, a clock and settings.
         wiring: model of what a rig file says under ``wires.base``.
         transport: from such wiring, settings, the name in recordings and a clock.
-        emulator_host: the module that serves such a device in emulated laboratories, told the wiring, the settings and
+        emulator_host: the module that serves such a device in emulated laboratories, from the wiring, the settings and
             where the mount stands; empty where there is none.
     """
 

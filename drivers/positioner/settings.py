@@ -1,4 +1,4 @@
-"""Limits of the positioner, and what it tells."""
+"""Limits of the positioner, and its counters."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ class PositionerCounters:
 
     Attributes:
         cycles: exchanges.
-        lost: commands whose status never came; until another one tells, cycles in which one is overdue.
+        lost: commands whose status never came; until a later status shows that, cycles in which one is overdue.
         lost_in_a_row: the present run of such cycles.
         malformed: messages that were no status.
         late: statuses that came behind newer ones, and were left alone.

@@ -1,6 +1,6 @@
 """Meshes of several parts, as modelling programs export them: which lie inside others, and what all enclose together.
 
-What is inside is told by the winding number, which also holds where parts cut through one another.
+The winding number decides what is inside, even where parts intersect.
 """
 
 from __future__ import annotations

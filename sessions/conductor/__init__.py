@@ -1,1 +1,1 @@
-"""A session, grasp after grasp; the protocols of whoever estimates and decides."""
+"""A session, grasp after grasp; the protocols of estimator and decision maker."""

@@ -148,8 +148,8 @@ class SessionRoles:
         decisions: decides about them.
         estimator: client of estimator and planner; open while the session runs.
         weigh: drags and lifts the object that these fingers hold; None for a session that cannot.
-        survey: measures the object's bounding box before the first grasp; its argument tells whether to skip the rest.
-            None for a session without it.
+        survey: measures the object's bounding box before the first grasp; its argument returns whether to skip the
+            rest. None for a session without it.
         guard: receives Ctrl+C while the session runs; code that waits for a person checks it.
     """
 

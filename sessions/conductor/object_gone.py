@@ -27,7 +27,7 @@ def not_found(box: BoundingBox, expected_m: Array, around_m: float, lowest_m: fl
     return (
         f"no object was found where it is expected; {box.in_words()} at {_place(expected_m)} and "
         f"{1e3 * around_m:.0f} mm around, down to {1e3 * lowest_m:.0f} mm above the table. Put the object there, or "
-        "give its place in the rig file (conductor.plan.start_m); anything lower or thinner than a fingertip is not felt"
+        "give its place in the rig file (conductor.plan.start_m); objects below a fingertip's size are not felt"
     )
 
 

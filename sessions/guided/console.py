@@ -92,7 +92,7 @@ class OperatorConsole:
     def wants_capture(self) -> bool:
         """Whether the operator requests the capture, or it is automatic and the grasp is steady.
 
-        Without any finger in contact the operator has to ask twice: the grasp would count, and tell nothing.
+        Without any finger in contact the operator has to ask twice: the grasp would count, without any information.
         """
         asked = any(request.ask in (Ask.NEXT, Ask.CAPTURE) for request in self.take())
         if asked and not self.view.touching and not self._warned_of_nothing:

@@ -177,7 +177,7 @@ class GraspCycle:
         """Guarded descent, slower from the object's top on.
 
         Returns:
-            What landed on something: fingers, or links that cannot tell which they are.
+            What landed on something: fingers, or unidentified links.
         """
         s, guard, motion, table = self.settings, self._landing, self._motion, self._table()
         to_top_m = motion.tallest_m + s.touch.near_m - open_hand(table.name, table.height_m, self._hand).lowest_m

@@ -1,7 +1,7 @@
-"""Whether a link that feels nothing has met something: the motors of its finger or of the wrist tell it late.
+"""Whether a link without a sensor has hit something: the motors of its finger or of the wrist show it, late.
 
 While the hand moves evenly through free space each motor's strain gauge shows the same but for noise. What pushes on a
-knuckle or on the palm changes that: first the wrist's motor, then the finger's. On the simulated rig it tells 2 to
+knuckle or on the palm changes that: first the wrist's motor, then the finger's. On the simulated rig it shows 2 to
 4 N of a push from the side at 20 to 50 mm/s; on real tendons expect several times as much. So this is the last guard:
 plans keep links away from what is known.
 """
@@ -39,7 +39,7 @@ class LinkWatch:
         """Take the newest reading; whether something pushes on a link.
 
         Args:
-            torques: counts of all motors, shape (20,), None where the hand tells none.
+            torques: counts of all motors, shape (20,), None if the hand reports none.
             stamp_ns: when it arrived. A reading that was judged before is not a second one that says so.
         """
         if torques is None or stamp_ns is None or (self._newest is not None and stamp_ns == self._newest[0]):

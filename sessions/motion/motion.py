@@ -45,7 +45,7 @@ class Motion:
         self._loads_N: dict[str, float] = {}
         self._resting_N: dict[str, float] = {}
         self.motor_torques: Array | None = None
-        """Newest strain-gauge counts of the motors, shape (20,); None where the hand tells none."""
+        """Newest strain-gauge counts of the motors, shape (20,); None if the hand reports none."""
         self.hand_stamp_ns: int | None = None
         """When the newest status of the hand arrived, session clock; None before the first."""
         self.tallest_m = 0.0

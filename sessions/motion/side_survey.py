@@ -1,7 +1,7 @@
 """What is too tall for the palm to pass over is felt from its sides: four touches, palm upright, low down.
 
 The top is known by then. A touch comes from the left and the right of the arm's middle yaw, and from before and behind
-as nearly as the arm's yaw window allows; the normals of what is touched tell how the object stands turned.
+as nearly as the arm's yaw window allows; the normals of the contacts show the object's heading.
 """
 
 from __future__ import annotations

@@ -125,7 +125,7 @@ class Weigher:
         Args:
             raised: positioner joints at a height and a distance aside.
             where_m: the height, and how far to each side.
-            begin, complete: tell the runtime what is measured.
+            begin, complete: start and end the measurement in the runtime.
         """
         height_m, far_m = where_m
         begin()

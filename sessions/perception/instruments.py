@@ -46,7 +46,7 @@ def warmest_C(reading: object) -> float | None:
 
 
 def motor_torques(reading: object) -> Array | None:
-    """Strain-gauge counts of the motors in a sample of the hand, shape (20,); None before all have told theirs."""
+    """Strain-gauge counts of the motors in a sample of the hand, shape (20,); None before all have reported."""
     torques = getattr(getattr(reading, "motor", None), "torque", None)
     return torques if isinstance(torques, np.ndarray) and np.isfinite(torques).all() else None
 

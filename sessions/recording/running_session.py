@@ -143,7 +143,7 @@ class RunningSession(Session):
 
 
 def _in_words(error: BaseException) -> str:
-    """Why a session failed, for people who read it later: "1" or nothing would tell nobody anything."""
+    """Why a session failed, for people who read it later: "1" or nothing would help nobody."""
     if isinstance(error, TactileLabError):
         return str(error)
     if isinstance(error, SystemExit):

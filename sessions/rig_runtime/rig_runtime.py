@@ -261,7 +261,7 @@ class RigRuntime:
         self._record_event(EventKind.DRAG_BEGIN)
 
     def end_dragging(self) -> Dragging | None:
-        """Compute the table's friction; None if the fingertips told nothing."""
+        """Compute the table's friction; None if the fingertips measured nothing."""
         found = self._record_event(EventKind.DRAG_END)
         assert found is None or isinstance(found, Dragging)
         return found
@@ -271,7 +271,7 @@ class RigRuntime:
         self._record_event(EventKind.HANG_BEGIN)
 
     def end_hanging(self) -> Hanging | None:
-        """Compute the object's weight; None if the fingertips told nothing."""
+        """Compute the object's weight; None if the fingertips measured nothing."""
         found = self._record_event(EventKind.HANG_END)
         assert found is None or isinstance(found, Hanging)
         return found

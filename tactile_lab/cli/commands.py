@@ -24,7 +24,7 @@ class Commands(TyperGroup):
     """Looks up commands in :data:`COMMANDS` lazily: extensions register theirs while options are parsed."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command; a mistake in an option is told in plain words, whichever library found it."""
+        """Run the command; a mistake in an option gets a plain message, whichever library found it."""
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:

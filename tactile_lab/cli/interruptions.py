@@ -88,7 +88,7 @@ def _like_ctrl_c(number: int, frame: FrameType | None) -> None:
 
 
 def _on_hangup(number: int, frame: FrameType | None) -> None:
-    """The terminal is gone: one request to end in order, though the system and a shell both tell of it."""
+    """The terminal is gone: one request to end in order, though the system and a shell both signal it."""
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     _like_ctrl_c(number, frame)
 

@@ -1,6 +1,6 @@
 """Plots of experiments that are surfaces, seen from the side and above, shaded by a value.
 
-The shades differ in lightness, evenly, so that a grey print tells the same.
+The shades differ in lightness, evenly, so that a grey print shows the same.
 """
 
 from __future__ import annotations

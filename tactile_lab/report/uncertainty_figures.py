@@ -102,9 +102,8 @@ def calibration_curve(consistency: Mapping[str, Any]) -> str | None:
                 (x, y), "mark" if name == "surface" else "truth-dot", tip=f"{name}: {y:.0f} % of stated {x:.0f} %"
             )
         said.append(f"{name} {points[-1, 1]:.0f} % inside the stated {points[-1, 0]:.0f} %")
-    return chart.text(
-        "Calibration curve", f"On the diagonal the stated uncertainties are true; here {' and '.join(said)}."
-    )
+    words = f"On the diagonal the stated uncertainties are true; here {' and '.join(said)}."
+    return chart.text("Calibration curve", words)
 
 
 def camera_picture(content: ReportContent) -> str | None:

@@ -100,7 +100,7 @@ class WiredLaboratory:
 def open_laboratory(rig: Rig, seed: int, object_name: str) -> Iterator[SimulatedLaboratory | WiredLaboratory]:
     """The laboratory of a rig with an object on its table; emulators run while the context lasts.
 
-    A real laboratory takes any name for its object. That of the catalogue, or of a mesh, tells its true shape.
+    A real laboratory takes any name for its object. A name of the catalogue, or of a mesh, gives its true shape.
 
     Raises:
         ConfigurationError: no such object in a simulation, a mesh that cannot be used, or emulators that this program

@@ -98,7 +98,7 @@ def with_palm(rig: Rig, clock: Clock) -> Rig:
     """A rig on wires with its palm and its cycle named, so that a session keeps how its hand was read and driven.
 
     Raises:
-        DeviceError: the rig file leaves it to the ring, which does not tell.
+        DeviceError: neither the rig file nor the ring states it.
     """
     found = hand_setup(rig).with_known_palm(clock).hand
     hand = rig.description.hand.model_copy(update={"palm": found.palm, "cycle_s": found.cycle_s})

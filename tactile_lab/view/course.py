@@ -43,7 +43,7 @@ class ShownCourse:
     uncertainty: dict[int, ShownUncertainty] = field(default_factory=dict)
 
     def take_forces(self, stamp_ns: int, loads_N: Mapping[str, float | None]) -> None:
-        """Add a reading. A clock that goes back, as in another session, begins anew."""
+        """Add a reading. If the clock goes back, as in another session, the course restarts."""
         if self.forces and stamp_ns < self.forces[-1][0]:
             self.forces.clear()
         if self.forces and stamp_ns - self.forces[-1][0] < _STEP_ns:

@@ -1,4 +1,4 @@
-"""The page's own socket: in a folder of this user's alone, and deaf to whoever does not know this program's secret.
+"""The page's own socket: in a folder of this user's alone, and closed to clients without this program's secret.
 
 viser would listen on a port, where every program of this computer could press the buttons that move the hand.
 """
@@ -33,7 +33,7 @@ class InnerDoor:
 
     @contextmanager
     def in_place_of_ports(self) -> Iterator[None]:
-        """Within the block servers of the package ``websockets`` listen here, whatever port they are told."""
+        """Within the block servers of the package ``websockets`` listen here, on any port."""
         from websockets.asyncio import server
 
         usual = server.serve

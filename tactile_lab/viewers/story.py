@@ -75,7 +75,7 @@ class Story:
         yield SensorWrench(stamp_ns, finger, self.robot.sensor_frame(finger), wrench[:3], wrench[3:])
 
     def picture(self, stamp_ns: int, encoded: bytes) -> Iterator[Item]:
-        """A camera picture. The first that shows the world marker tells where the camera stands."""
+        """A camera picture. The first that shows the world marker determines the camera's pose."""
         yield Picture(stamp_ns, encoded)
         if self._camera is not None and (found := self._camera.first_sight(encoded)) is not None:
             yield Frames(stamp_ns, (Placement(WORLD, CAMERA, found),), lasting=True)

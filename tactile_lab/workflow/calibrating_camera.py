@@ -61,7 +61,7 @@ def gather_views(
     Args:
         most: end with so many views.
         least: a camera is not stopped before so many, whatever they cover.
-        told: after each picture that was used or refused, for guidance.
+        told: called after each picture that was used or refused, for guidance.
         goes_on: asked before each picture; False ends with the views there are.
 
     Raises:

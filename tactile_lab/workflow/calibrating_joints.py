@@ -159,10 +159,10 @@ def pose_wizard(
 
 
 def from_touches(data: ForearmData, rig: Rig, settings: JointSettings) -> FoundJoints:
-    """Corrections of the joints that touches tell: of a block alone by the forearm's calibration, else with it.
+    """Corrections of the joints that touches determine: of a block alone by the forearm's calibration, else with it.
 
     Raises:
-        ConfigurationError: too few touches, or they tell no joint.
+        ConfigurationError: too few touches, or they determine no joint.
     """
     if is_of_block(data.touches):
         found = solve_block(data.touches, load_forearm(rig.files["forearm"]), settings.block)

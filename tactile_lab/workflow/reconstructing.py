@@ -81,7 +81,7 @@ def reconstruct(
         wishes: how to estimate.
         out: folder of the results, those of an earlier estimation in it are replaced; None for one beside the data
             that is named after the method, and the shape model if one was chosen.
-        progress: is told which grasp is being estimated.
+        progress: receives the number of the grasp that is being estimated.
 
     Raises:
         ConfigurationError: options, log, true mesh, settings or folder do not fit, or the method needs a truth that is

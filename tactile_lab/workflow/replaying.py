@@ -42,7 +42,7 @@ def replay_session(
         session: the recording.
         settings, seed: of the estimation; with the recorded ones the results are the session's own, byte for byte.
         out: folder of the results; those of an earlier replay in it are replaced.
-        progress: is told which grasp is being estimated.
+        progress: receives the number of the grasp that is being estimated.
         speed: of the bytes: 1 the original pace, 4 four times as fast, 0 as fast as possible.
 
     Raises:

@@ -41,7 +41,7 @@ def _svg_line(line: Line) -> str:
 
 
 def pdf_bytes(sheet: Sheet) -> bytes:
-    """The sheet as PDF, made for printing at 100 %: viewers are told not to scale it."""
+    """The sheet as PDF, made for printing at 100 %: it asks viewers not to scale it."""
     require_package("fpdf")
     from fpdf import FPDF, ViewerPreferences
     from fpdf.drawing import PaintedPath

@@ -119,7 +119,7 @@ class AprilGrid(MarkerPrint):
 def _as_they_stand(points_m: Array, quads_px: Array) -> tuple[Array, Array]:
     """Corners (n, 3) with their pixels (n, 2), the tags turned the way in which all of them lie on one plane.
 
-    A single tag cannot tell, and is taken to stand as Kalibr prints it.
+    A single tag does not show that; it is assumed to be oriented as Kalibr prints it.
     """
     turned = [np.roll(quads_px, -turn, axis=1).reshape(-1, 2) for turn in range(4)]
     if len(quads_px) == 1:

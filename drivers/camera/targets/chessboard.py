@@ -21,7 +21,7 @@ _RISE_sigmas = 2.563
 class Chessboard(Printed):
     """Black and white squares without markers.
 
-    Nothing tells for certain which way up it is. A lens does not mind: after half a turn its corners fall on each
+    Its orientation is ambiguous by half a turn. A lens does not mind: after half a turn its corners fall on each
     other. On the hand it cannot be used.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""What all prints have in common: a check bar that tells their true size, and what a picture of one shows."""
+"""What all prints have in common: a check bar that shows their true size, and what a picture of one shows."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Plug-ins: entries of registries that installed packages offer as entry points.
 
-A package names them in its ``pyproject.toml``, one table for each kind, and the program finds them without being told::
+A package names them in its ``pyproject.toml``, one table for each kind, and the program finds them by itself::
 
     [project.entry-points."tactile_lab.policies"]
     quickest = "my_laboratory.quickest:Quickest"
@@ -56,7 +56,7 @@ class Plugin:
 
     @property
     def file(self) -> str:
-        """The file of its module; the package with its version where that cannot be told without running it."""
+        """The file of its module; the package with its version if that is unknown before running it."""
         for module in (self._point.module, self._point.module.partition(".")[0]):
             try:
                 spec = find_spec(module)

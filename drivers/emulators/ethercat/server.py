@@ -161,7 +161,7 @@ class EmulatedHandProcess:
         joints: joint calibration file, used in reverse.
         settings: the kind of hand.
         motors: motor map; the simulated hand's unless given.
-        gains: Shadow's gains, whose signs tell which motors turn backwards; none does unless given.
+        gains: Shadow's gains, whose signs state which motors turn backwards; none does unless given.
     """
 
     def __init__(

@@ -58,7 +58,7 @@ class EmulationPlan:
         simulation: the plant, and the errors of the devices.
         seed: for all random numbers.
         hand: the hand.
-        base: what the positioner's emulator is told: ``wiring``, ``settings`` and ``world_T_mount`` of the rig.
+        base: settings of the positioner's emulator: ``wiring``, ``settings`` and ``world_T_mount`` of the rig.
         tips: calibration file of the fingertips.
         wires: wires of fingertips with their own transports, by finger; each kind must have an emulator.
         camera: address and TCP port of the camera, if there is one.

@@ -42,7 +42,7 @@ class HostProcess:
         return self._child.running
 
     def give(self, order: Order) -> None:
-        """Tell it what a person or the world does to its device, where it listens. Raises DeviceError if it is gone."""
+        """Send it an event from outside, such as a person's action on its device. Raises DeviceError if it is gone."""
         self._child.give(order)
 
     def kill(self) -> None:

@@ -53,7 +53,7 @@ def type_of(name: str) -> str:
 
 
 class Box(Protocol):
-    """What the box has to tell, and takes."""
+    """What the box publishes and accepts."""
 
     version: tuple[int, int, int, int]
     highest_Hz: float

@@ -39,7 +39,7 @@ class ArmOrder(IntEnum):
 
 
 class ArmFlags(IntFlag):
-    """What the arm's process knows: the arm is heard, its program runs, it can be led by hand, it was braked."""
+    """What the arm's process knows: the arm answers, its program runs, it can be led by hand, it was braked."""
 
     HEARD = 1
     PROGRAM = 2

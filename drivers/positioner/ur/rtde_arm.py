@@ -130,7 +130,7 @@ class RtdeArm:
     def _prepare(self) -> None:
         """Set tool, then the watchdog; what was set is read back. An arm that knows its load feels nothing at rest.
 
-        Where it stands is heard anew once the tool is set: a place told with another tool would be taken for a jump.
+        Its position is received again once the tool is set: one with another tool would look like a jump.
         """
         settings = self._settings
         assert settings.flange_T_forearm is not None

@@ -1,7 +1,7 @@
 """The links above the fingertips as balls: where they are while the fingertips keep to the lines of a closing.
 
 Fingertips are meant to touch and feel; the links above them feel nothing. Where one of those meets the object first,
-the finger pushes it along until something holds it. A row of balls along each link is enough to foresee that.
+the finger pushes it along until something holds it. A row of spheres along each link is enough to predict that.
 """
 
 from __future__ import annotations

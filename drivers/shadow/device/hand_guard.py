@@ -84,7 +84,7 @@ class HandGuard:
         self._joints.restart()
 
     def forbids_demands(self, now_ns: int) -> bool:
-        """There is a fault, or what was heard of the hand last is too old, by cycles or by time."""
+        """There is a fault, or the last status of the hand is too old, by cycles or by time."""
         if self.fault is not None or self.counters.lost_in_a_row >= self._settings.blind_after:
             return True
         return self._silent_s(now_ns) > STALE_s
@@ -110,7 +110,7 @@ class HandGuard:
         self.blame(self._watch.silence(driven, now_ns))
 
     def look_at_time(self, now_ns: int, *, driven: bool) -> None:
-        """Look at how long nothing was heard, before a cycle: the link was gone, or this program stood still.
+        """Check how long the hand was silent, before a cycle: the link was gone, or this program stood still.
 
         Args:
             now_ns: present time.
@@ -129,8 +129,8 @@ class HandGuard:
     def look_at_demand(self, words: NDArray[np.int16], last: HandSample, now_ns: int, *, is_nudge: bool) -> None:
         """Look at the demands that are to go out, shape (20,), before they do, with the sample that they rest on.
 
-        A motor told its most for too long has stalled; one that pushes against nothing has to move its joint. A nudge
-        need not: whoever nudges looks at what moves, and small duty cycles may not overcome friction.
+        A motor at its maximum for too long has stalled; one that pushes against nothing has to move its joint. A nudge
+        need not: the caller of the nudge checks what moves, and small duty cycles may not overcome friction.
         """
         self.blame(self._load.stall(words, last.joints_rad, now_ns))
         if not is_nudge:
@@ -168,7 +168,7 @@ class HandGuard:
 
 
 def _largest_pwm(settings: HandSettings, motors: MotorMap) -> NDArray[np.float64]:
-    """Largest duty cycle each motor is told, shape (20,); any where motors are told torques."""
+    """Largest duty cycle commanded to each motor, shape (20,); unlimited if torques are commanded."""
     if settings.demand == "torque":
         return np.full(MOTORS, float(MAX_PWM))
     return np.array([settings.gains.of(name).max_pwm for name in motors.names])

@@ -1,4 +1,4 @@
-"""What the hand's motors are told each cycle: nothing, a nudge of one, or control within limits that rise gently."""
+"""The demands to the hand's motors in each cycle: none, a nudge of one, or control within limits that rise gently."""
 
 from __future__ import annotations
 

@@ -25,12 +25,12 @@ class HandSettings(StrictModel):
     """How the host drives the hand.
 
     Attributes:
-        palm: which palm the hand has; on a cable the product code tells where this is left out (:attr:`palm_stated`).
-        side: which hand it is; its own files tell where this is left out, and must not contradict it.
+        palm: which palm the hand has; on a cable the product code decides if this is left out (:attr:`palm_stated`).
+        side: which hand it is; its own files decide if this is left out, and must not contradict it.
         fingers: that it has; the same.
         cycle_s: period of the exchanges, seconds; below the 20 ms after which motors halt for want of a demand. On a
             cable it is :data:`WIRE_CYCLE_s` where it is left out (:attr:`on_wire`).
-        demand: what the motors are told: a duty cycle, or a torque that they keep by themselves at 5 kHz.
+        demand: what is commanded to the motors: a duty cycle, or a torque that they keep by themselves at 5 kHz.
         gains: position control, in counts of that demand.
         polling: how often the motors are asked for what.
         tactile: kind of fingertip asked for data through the palm.

@@ -38,7 +38,7 @@ class HandSetup(StrictModel):
         boards: settings to upload to the motor boards when connecting; they keep theirs when left out.
         rates: how often motors are asked for what, in place of ``hand.polling``.
         gains: position control as Shadow delivers it (``sr_edc_joint_position_controllers_PWM.yaml``), in place of
-            ``hand.gains``; its signs tell which motors turn backwards.
+            ``hand.gains``; its signs state which motors turn backwards.
     """
 
     name: str = "hand"
@@ -52,7 +52,7 @@ class HandSetup(StrictModel):
     gains: Path | None = None
 
     def with_known_palm(self, clock: Clock) -> HandSetup:
-        """The same hand with its palm named: as it is stated, else as the ring tells by the palm's product code.
+        """The same hand with its palm named: as stated, else by the palm's product code on the ring.
 
         Raises:
             DeviceError: what is missing on the ring or wrong, and what to do.
@@ -62,7 +62,7 @@ class HandSetup(StrictModel):
 
     @property
     def stated_palm(self) -> PalmName | None:
-        """The palm that a file names, of the hand or of its cable; None where the ring is to tell."""
+        """The palm that a file names, of the hand or of its cable; None if the ring decides."""
         return self.hand.palm if self.hand.palm_stated else self.ethercat.palm
 
     def settings(self) -> HandSettings:

@@ -87,7 +87,7 @@ class HandWorker:
         return sample
 
     def _exchange(self) -> HandSample | None:
-        """A fault is told once; the cycle goes on with zero demands until someone resumes or ends it."""
+        """A fault is reported once; the cycle continues with zero demands until it is resumed or ended."""
         try:
             return self._hand.exchange()
         except DeviceError as error:

@@ -48,7 +48,7 @@ class SensorLimits(StrictModel):
 
 
 class JointWatch:
-    """Judges the readings of all joints, and tells of those that are driven.
+    """Checks the readings of all joints, and reports those that are driven.
 
     Args:
         calibration: of the hand's joints; says which counts each may have.

@@ -51,7 +51,7 @@ class LoadWatch:
     Args:
         motors: names of the motors.
         limits: see there.
-        largest_pwm: largest duty cycle each motor may be told, shape (20,), counts; MAX_PWM where it keeps a torque.
+        largest_pwm: largest allowed duty cycle of each motor, shape (20,), counts; MAX_PWM where it keeps a torque.
         where: name of the hand in messages.
     """
 

@@ -152,10 +152,10 @@ class MotorReadings:
 
     Attributes:
         torque: strain-gauge difference, counts, shape (20,); comes with every answer.
-        torque_stamps_ns: when each was heard, shape (20,), session clock; -1 for never.
+        torque_stamps_ns: when each arrived, shape (20,), session clock; -1 for never.
         values: latest value of each type, shape (16, 20), rows by
         :class:`~drivers.shadow.protocol.motor_data.FromMotor`.
-        stamps_ns: when each was heard, shape (16, 20); -1 for never.
+        stamps_ns: when each arrived, shape (16, 20); -1 for never.
         slow: what never changes, shape (17, 20), rows by :class:`~drivers.shadow.protocol.motor_data.SlowData`.
     """
 

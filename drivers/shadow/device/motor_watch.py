@@ -71,7 +71,7 @@ class MotorWatch:
         motors: names of the motors.
         heat: temperature limits.
         where: name of the hand in messages.
-        keep_torque: the motors are told torques, which some flags forbid.
+        keep_torque: torques are commanded, which some flags forbid.
     """
 
     def __init__(self, motors: MotorMap, heat: HeatLimits, where: str, *, keep_torque: bool = False) -> None:
@@ -80,7 +80,7 @@ class MotorWatch:
         self.restart()
 
     def restart(self) -> None:
-        """Forget who was heard."""
+        """Forget which motors have answered."""
         self._status_ns: int | None = None
         self._heard_ns = np.zeros(len(self._motors.names), dtype=np.int64)
         self._missed = np.zeros(len(self._motors.names), dtype=np.int64)

@@ -40,7 +40,7 @@ class ShadowBridgeBus(can.BusABC):
         motor_bus: bus of sent messages that name no channel, 1 or 2.
         first_channel: channel by which messages name the first bus: 1, or 0 to play back a file in which another
             program numbered the buses 1 and 2, since python-can's readers count from 0.
-        palm: which palm the hand has; as its product code tells unless given, and the usual one behind a ``transport``
+        palm: which palm the hand has; by its product code unless given, and the usual one behind a ``transport``
         that
             does not know.
         transport: a transport to the palm in place of one over EtherCAT on ``channel``; it need not be open.
@@ -177,7 +177,7 @@ class ShadowBridgeBus(can.BusABC):
 
     @property
     def _refused(self) -> int:
-        """Commands the palm has not taken, where the transport can tell."""
+        """Commands the palm has not taken, if the transport counts them."""
         return self._transport.counts.refused if isinstance(self._transport, EthercatTransport) else 0
 
     def _message(self, frame: CanFrame, stamp_ns: int) -> can.Message:

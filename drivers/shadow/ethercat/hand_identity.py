@@ -68,7 +68,7 @@ def checked_image(
         stated: the palm that must be there; any that can be driven when None.
         serial: the hand that must be there; any when None.
         where: the interface or device, for messages.
-        side: the side that must be there, where the product code tells it; any when None.
+        side: the side that must be there, if the product code states it; any when None.
 
     Raises:
         DeviceError: a board that does not belong there, with what to do.

@@ -40,7 +40,7 @@ class EthercatSettings(StrictModel):
         interface: network interface the hand is plugged into.
         palm: the palm that must be there; any that can be driven when left out.
         serial: the hand that must be there; any when left out.
-        side: the side that must be there, as far as the palm's product code tells it; any when left out.
+        side: the side that must be there, as far as the palm's product code states it; any when left out.
         watchdog_s: palm leaves OP when no command came for so long; when left out it relies on its motors, which halt
             by themselves after 20 ms, as Shadow's own driver does.
         poll_every: the slaves' states are looked at every so many cycles.

@@ -64,7 +64,7 @@ class HandRing:
         return HandIdentity(bridge, palm, image, watchdog_s)
 
     def resume(self, image: PalmImage) -> None:
-        """Back to OP from SAFEOP, where the palm's watchdog has left it; all it is told are zeros.
+        """Back to OP from SAFEOP, where the palm's watchdog has left it; only zeros are commanded.
 
         Raises:
             DeviceError: the palm refuses, or does not answer.

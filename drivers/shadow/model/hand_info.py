@@ -1,8 +1,8 @@
-"""Which hand it is, by everything that tells: its own configuration folder, its motor map, and the rig file.
+"""Which hand it is, from all sources: its own configuration folder, its motor map, and the rig file.
 
 Shadow's folder for a serial number holds ``general_info.yaml`` above the calibration (protocols: Joint calibration
 files). A left hand that is taken for a right one has all its contacts mirrored, and a hand with fewer fingers would be
-asked for joints that it does not have. So all that is told is compared before anything moves.
+asked for joints that it does not have. So all statements are compared before anything moves.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def _info_place(file: Path) -> Path | None:
 
 
 def told_serial(infos: Iterable[Path]) -> int | None:
-    """The hand's serial number by the names of its folders, which are Shadow's; None where they tell none.
+    """The hand's serial number by the names of its folders, which are Shadow's; None if they contain none.
 
     Raises:
         ConfigurationError: the files are of two hands.
@@ -105,10 +105,10 @@ def check_map(motors: Path, infos: Mapping[Path, HandInfo]) -> None:
 
 
 def told_form(motors: Path, infos: Mapping[Path, HandInfo], stated: HandStatement) -> HandForm:
-    """The form of the hand that all these files tell, a right hand's where nothing tells the side.
+    """The form of the hand by all these files; a right hand's if none states the side.
 
     Args:
-        motors: its motor map, which tells the joints.
+        motors: its motor map, which names the joints.
         infos: see :func:`load_infos`.
         stated: what the rig file says.
 

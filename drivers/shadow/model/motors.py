@@ -62,7 +62,7 @@ class MotorMap:
         numbers: motor number 0 to 19 of each driven joint that the hand has, of :data:`DRIVEN_JOINTS`.
         backwards: driven joints that a positive duty cycle turns towards smaller angles.
         where: the file, for error messages.
-        told_side: the side of the hand, where the file tells it.
+        told_side: the side of the hand, if the file states it.
 
     Attributes:
         names: driven joint of each motor, by motor number; empty for a place without a motor.
@@ -121,7 +121,7 @@ class MotorMap:
         return cls(own.motors, own.reversed, str(path), own.side)
 
     def reverse(self, backwards: tuple[str, ...]) -> MotorMap:
-        """The same map with other joints turning backwards, as a file of gains tells by their signs."""
+        """The same map with other joints turning backwards, by the signs in a file of gains."""
         own = tuple(name for name in backwards if name in self.numbers)
         return MotorMap(self.numbers, own, "motor map", self.told_side)
 

@@ -1,7 +1,7 @@
 """The motor boards' settings: Shadow's file format, and their upload after connecting (protocols: Motor demands).
 
 Ten words a motor in successive cycles, the other motors' words zero, then a checksum that makes the motor take them
-over. A cycle that is lost is sent again. When all are sent, the motors' flags tell whether each took its own.
+over. A cycle that is lost is sent again. When all are sent, the motors' flags show whether each accepted its own.
 """
 
 from __future__ import annotations

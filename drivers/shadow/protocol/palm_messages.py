@@ -1,4 +1,4 @@
-"""What host and palm tell each other, whatever the palm's layout (protocols: Palm images; Joint sensors)."""
+"""Messages between host and palm, independent of the palm's layout (protocols: Palm images; Joint sensors)."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class CarryNoise:
         let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
-        unseen: share of the hand's motion while fewer than two fingertips held the object, one was not heard, or the
+        unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
 
@@ -87,7 +87,7 @@ class Carry:
     sliding: Array = field(default_factory=lambda: np.zeros(0))
 
     def in_words(self) -> str:
-        """What to tell a person who watches."""
+        """The carry in words, for people."""
         slipped = f"slipped {1e3 * self.slip_m:.0f} mm, {np.degrees(self.slip_rad):.0f} degrees"
         return "; ".join([slipped, *self.problems])
 
@@ -113,7 +113,7 @@ class CarryOdometry:
     """Estimates carries; knows from earlier grasps how large the object is.
 
     Args:
-        fingertips: that tell their contacts while they move, by finger.
+        fingertips: that measure contacts while they move, by finger.
         side: of the hand.
         scale: factor of the stated standard deviations.
     """
@@ -124,7 +124,7 @@ class CarryOdometry:
         self.noise = CarryNoise()
 
     def on_grasp(self, contacts: Sequence[Contact]) -> None:
-        """Contacts of a grasp: they tell the size of the object's foot."""
+        """Contacts of a grasp: they show the size of the object's foot."""
         if len(contacts) > 1:
             places_m = np.array([contact.point_world_m[:2] for contact in contacts])
             gaps = places_m[:, None] - places_m[None]
@@ -137,7 +137,7 @@ class CarryOdometry:
         return float(np.clip(_FOOT_SHARE * half_m, _LEAST_FOOT_m, _LARGEST_FOOT_m))
 
     def estimate(self, samples: CarrySamples) -> Carry:
-        """The carry that these samples tell of."""
+        """The carry by these samples."""
         return self.carry(tip_steps(samples, self._fingertips, self._side))
 
     def carry(self, steps: TipSteps) -> Carry:
@@ -223,7 +223,7 @@ def _resisted_N(steps: TipSteps) -> float:
 
 
 def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip]) -> Array:
-    """The hand's motion, metres and radians, in steps that too few fingertips tell of; shape (2,)."""
+    """The hand's motion, metres and radians, in steps that too few fingertips measure; shape (2,)."""
     wired = [finger in fingertips for finger in FINGERS]
     poorly = (steps.felt.sum(axis=1) < 2) | (steps.is_void & wired).any(axis=1)
     doubt = np.maximum(poorly, _resistance(steps))

@@ -70,7 +70,7 @@ class CarryRecord:
     """Keeps the samples since an object was grasped.
 
     Args:
-        fingertips: that tell their contacts while they move, by finger; without any, nothing is kept.
+        fingertips: that measure contacts while they move, by finger; without any, nothing is kept.
     """
 
     def __init__(self, fingertips: Mapping[str, ContinuousFingertip]) -> None:

@@ -15,7 +15,7 @@ from sessions.perception.touch_capture import Measured
 
 
 class HeldObject:
-    """Collects what hand and fingertips tell from a capture on, and estimates the carry when a hold ends.
+    """Collects the readings of hand and fingertips from a capture on, and estimates the carry when a hold ends.
 
     The object begins to slip when the fingers squeeze it, which is before the hold: so the capture is the beginning.
     It ends with the hold. While the fingers open, they leave one after the other, and light contacts mislead.
@@ -33,7 +33,7 @@ class HeldObject:
         self.contact_height_m = 0.0
         """Mean height of the last capture's contacts above the table."""
         self.carry: Carry | None = None
-        """The last completed one; None if the fingertips told nothing."""
+        """The last completed one; None if the fingertips measured nothing."""
 
     @property
     def is_watched(self) -> bool:
@@ -66,11 +66,11 @@ class HeldObject:
         self._record.end()
 
     def samples_since(self, stamp_ns: int) -> CarrySamples | None:
-        """What hand and fingertips told since a moment of this grasp; None for too little."""
+        """Readings of hand and fingertips since a moment of this grasp; None for too little."""
         return self._record.since(stamp_ns)
 
     def carried_until(self, stamp_ns: int) -> Carry | None:
-        """The carry from the capture until a moment since; None if the fingertips told nothing."""
+        """The carry from the capture until a moment since; None if the fingertips measured nothing."""
         samples = self._record.since(self._from_ns)
         samples = None if samples is None else samples.until(stamp_ns)
         return None if samples is None else self._odometry.estimate(samples)

@@ -1,8 +1,8 @@
 """How the fingertips' material moves at its contacts with the object, step by step.
 
 A step spans :data:`STEP_SAMPLES` samples. The contact of a fingertip is felt at its beginning; the *material* point of
-the fingertip that is there moves with the finger until its end. Taking it anew for each step makes rolling right.
-Contacts are expressed in the middle of the step, so that a turn of the hand leaves no error of second order.
+the fingertip that is there moves with the finger until its end. Determining it again for each step is correct for
+rolling. Contacts are expressed in the middle of the step, so that a turn of the hand leaves no error of second order.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class TipSteps:
         points_m: contact points in the middle of each step, shape (n, 5, 3).
         normals: unit normals out of the object, shape (n, 5, 3).
         moves_m: motion of the fingertip's material at the contact, shape (n, 5, 3).
-        forces_N: normal forces, shape (n, 5); zero without a contact that tells something.
+        forces_N: normal forces, shape (n, 5); zero without an informative contact.
         sinking: how much deeper each fingertip sinks in, in units of its give (:func:`_sinking`), shape (n, 5).
         tangential_N: forces along the surface, shape (n, 5); zero likewise.
         net_forces_N: force of all fingertips on the object, shape (n, 3).

@@ -29,7 +29,7 @@ class Scales:
         self.properties = ObjectProperties()
 
     def event(self, event: SessionEvent, grasp_index: int) -> Dragging | Hanging | None:
-        """Hear that a drag or a lift begins or ends. Returns what was found; None if the fingertips told nothing.
+        """A drag or a lift begins or ends. Returns the result; None if the fingertips measured nothing.
 
         Raises:
             SessionError: an end without a beginning.

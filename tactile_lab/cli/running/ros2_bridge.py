@@ -82,7 +82,7 @@ def ros2_bridge(
 
 
 def _run(request: SessionRequest, feed: Ros2Feed, *, guided: bool) -> None:
-    """One session; how it ended is told, and the node goes on."""
+    """One session; the node reports its end, and continues."""
     from drivers.core.errors import InterruptionError, TactileLabError
     from tactile_lab.cli.console import answer, complain, say, warn
     from tactile_lab.cli.running.progress import LiveProgress

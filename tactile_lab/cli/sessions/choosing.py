@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def resolve_name(root: Path, name: str) -> str:
-    """The session that a name means: ``last`` becomes its folder, and people are told which one that is.
+    """The session that a name means: ``last`` becomes its folder, and the choice is printed.
 
     Raises:
         ConfigurationError: there is no last one.

@@ -64,7 +64,7 @@ def read_json_object(path: Path, *, hint: str) -> dict[str, Any]:
     """Read a JSON object.
 
     Raises:
-        SessionError: the file is missing, unreadable or not a JSON object; ``hint`` tells the user what to do.
+        SessionError: the file is missing, unreadable or not a JSON object; ``hint`` says what to do.
     """
     try:
         content = parse_json(read_bounded(path, LARGEST_JSON_bytes))

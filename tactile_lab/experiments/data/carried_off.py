@@ -1,4 +1,4 @@
-"""Grasps of an object that somebody puts elsewhere in between, which the hand's motion does not tell."""
+"""Grasps of an object that somebody moves in between, which the hand's motion does not show."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class FlatSides:
         return turned, self.distances_m + self.sliding @ displacements_m
 
     def corners(self, corners_m: Array, meeting: NDArray[np.bool_], error: EstimateOffset) -> Array:
-        """Corners of shape (k, d) after an error; ``meeting`` (k, n) tells the sides that meet at each."""
+        """Corners of shape (k, d) after an error; ``meeting`` (k, n) marks the sides that meet at each."""
         normals, distances_m = self.at(error.angles_rad, error.displacements_m)
         moved = corners_m.copy()
         for corner, sides in zip(moved, meeting, strict=True):

@@ -68,7 +68,7 @@ class Look:
 
 
 class CoverageMonitor:
-    """Monitors the coverage of a running session; it only tells the session when to end.
+    """Monitors the coverage of a running session; it only decides when the session ends.
 
     Args:
         mesh: the true surface, in the frame of the true poses.

@@ -1,6 +1,6 @@
 """One failure of a recording under full load, from a cell to its figures.
 
-The load runs in a separate process and is killed, or loses its disk. A shared file tells which messages it had passed
+The load runs in a separate process and is killed, or loses its disk. A shared file records which messages it had passed
 to the recorder; the recovered session is compared with it, message by message.
 """
 

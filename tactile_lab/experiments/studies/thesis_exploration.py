@@ -90,7 +90,7 @@ _ACTIONS_KEY = "twelve poses drawn from the particles, weighted by the contacts 
 
 FIGURE_4_6 = Experiment(
     "figure-4.6",
-    "Thesis, figures 4.6 and 4.7: three grasps that could reduce the uncertainty of a rectangle's pose, and what they do.",
+    "Thesis, figures 4.6 and 4.7: three grasps to localize a rectangle, and what they find.",
     lambda grasps: grid(action=[pose_actions.NOTHING, *pose_actions.ACTIONS]),
     pose_actions.try_action,
     (

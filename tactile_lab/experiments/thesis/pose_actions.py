@@ -1,6 +1,6 @@
-"""What three grasps would tell of an uncertain pose, and what they tell: figures 4.6 and 4.7.
+"""Expected and actual information of three grasps about an uncertain pose: figures 4.6 and 4.7.
 
-A rectangle of 10 x 6 cm was touched by some grasps, then pushed with full motion noise. Each action is foreseen by the
+A rectangle of 10 x 6 cm was touched by some grasps, then pushed with full motion noise. Each action is predicted by the
 estimate, as the policies of section 4.5.2.2 do; then it is executed on the object where it truly is.
 """
 
@@ -70,7 +70,7 @@ class PushedObject:
 
 
 def try_action(cell: Cell) -> dict[str, Any]:
-    """An action, foreseen and executed. Cell: action, or that there was none yet."""
+    """An action, predicted and executed. Cell: action, or that there was none yet."""
     pushed = pushed_object(cell.seed)
     rng = np.random.default_rng([cell.seed, 47])
     simulated = simulate_weights(pushed.candidates, pushed.belief, _SETTINGS, rng)

@@ -114,7 +114,8 @@ class PoseSwitchPolicy:
             return self._for_shape(candidates, belief, rng)
         scores = self._pose_scores(candidates, belief, rng)
         x_mm, y_mm, yaw_deg = np.sqrt(np.maximum(np.diag(belief.pose_covariance), 0)) * [1e3, 1e3, 180 / np.pi]
-        reason = f"the pose is uncertain ({x_mm:.0f} mm, {y_mm:.0f} mm, {yaw_deg:.0f} deg), and this grasp is the most informative about it"
+        sigmas = f"{x_mm:.0f} mm, {y_mm:.0f} mm, {yaw_deg:.0f} deg"
+        reason = f"the pose is uncertain ({sigmas}): this grasp is the most informative"
         return best_of(self.name, scores, reason, rng)
 
     def _for_shape(self, candidates: Sequence[Candidate], belief: Belief, rng: np.random.Generator) -> Decision:

@@ -74,7 +74,7 @@ class BackEnd:
         return self._correct(contact_map) if any(loop.report.accepted for loop in found) else contact_map
 
     def close_all_loops(self, contact_map: ContactMap) -> ContactMap:
-        """Compare all grasps anew on the final map, whose faces are known best."""
+        """Compare all grasps again on the final map, whose faces are known best."""
         if not self._settings.enabled or len(contact_map.placed) < 3:
             return contact_map
         grasps = list(range(2, len(contact_map.placed)))

@@ -108,7 +108,7 @@ def split_by_paths(points_m: Array, labels: Labels, neighbours: int) -> Labels:
     """Appendix A, step 2: a cluster is divided where the path between two of its contacts leaves it.
 
     Paths are shortest ones (Dijkstra) over a graph that links every contact to its nearest ones; a path that
-    needs a contact of another cluster tells that another face lies between. Contacts that reach each other
+    needs a contact of another cluster shows that another face lies between. Contacts that reach each other
     without leaving stay together.
     """
     predecessors = _shortest_path_predecessors(points_m, neighbours)

@@ -49,7 +49,7 @@ class AddedTracker:
         return self._placed(lambda: self._tracker.refined)
 
     def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
-        """As the protocol says; one that does not take what was measured is not told."""
+        """As the protocol says; the measured uncertainty is passed only to trackers that accept it."""
         self._ask(lambda: self._predict(motion, measured))
 
     def _predict(self, motion: Array, measured: StepSigma | None) -> None:

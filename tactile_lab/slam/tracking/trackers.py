@@ -54,7 +54,7 @@ class TrackerStart:
     Attributes:
         map: the grasp that defines the object frame, with the shape model of the settings.
         rng: source of all random numbers.
-        known_poses: true ``world_T_object`` of all grasps that follow, for methods that are told.
+        known_poses: true ``world_T_object`` of all grasps that follow, for methods that use them.
         relocate: proposes poses anywhere on the object; None where it cannot.
     """
 

@@ -1,6 +1,6 @@
 """A server of Foxglove's WebSocket protocol (``foxglove.sdk.v1``; before, ``foxglove.websocket.v1``), to watch only.
 
-It announces topics and sends what a viewer subscribes to; whatever else a viewer sends is ignored. Whoever comes late
+It announces topics and sends what a viewer subscribes to; whatever else a viewer sends is ignored. A late viewer
 is first sent what is still true: the robot, fixed frames, contacts, the newest surface.
 """
 

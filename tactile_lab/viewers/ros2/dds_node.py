@@ -32,7 +32,7 @@ _PLAIN_CDR = Policy.DataRepresentation(use_cdrv0_representation=True)
 
 
 def quality(*, lasting: bool = False, kind: str = "") -> Qos:
-    """ROS 2's default quality of service; transient local where it lasts, with the type's hash where it is told."""
+    """ROS 2's default quality of service; transient local where it lasts, with the type's hash if it is given."""
     durability = Policy.Durability.TransientLocal if lasting else Policy.Durability.Volatile
     policies: list[Any] = [Policy.Reliability.Reliable(duration(milliseconds=100)), durability, _PLAIN_CDR]
     policies.append(Policy.History.KeepLast(1 if lasting else _DEPTH))  # so that no writer ever waits for a reader

@@ -26,7 +26,7 @@ _STEPS = frozenset({"capture", "next", "go"})
 
 
 class Services:
-    """Answers at once, by what the session last told; what is accepted is sent to the session.
+    """Answers at once, from the session's last state; accepted requests are sent to the session.
 
     Args:
         send: takes a request as plain data.

@@ -177,7 +177,7 @@ class DrawnField(Gpis):
         return np.concatenate(traces)
 
     def _extended_factor(self, observations: Observations) -> RowFactor | None:
-        """None: the factor is computed anew."""
+        """None: the factor is computed again."""
         return None
 
     @cached_property

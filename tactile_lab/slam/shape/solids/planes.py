@@ -128,7 +128,7 @@ def plane_price(count: int) -> float:
 
 
 def fit_planes(contacts: WeightedContacts, labels: NDArray[np.int64]) -> Planes:
-    """The best plane of each cluster; clusters are numbered anew, largest first."""
+    """The best plane of each cluster; clusters are renumbered, largest first."""
     _, first, label, sizes = np.unique(labels, return_index=True, return_inverse=True, return_counts=True)
     order = np.lexsort((first, -sizes))
     label = np.argsort(order)[label]

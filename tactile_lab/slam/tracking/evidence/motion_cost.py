@@ -98,7 +98,7 @@ class MotionCost:
     def information(self, rows: Array) -> Array:
         """Second derivative by all poses but the first, slips taken as Gaussian; shape ((k - 1) size, (k - 1) size).
 
-        A measured step tells as much less as it is farther off than it should be.
+        A measured step counts less, the farther it is from its expected spread.
         """
         count, size = len(rows) - 1, self._space.size
         later, earlier = self._space.slip_derivatives(rows, self._motions)

@@ -28,7 +28,7 @@ class FacetCertainty:
     Attributes:
         faces: in the object frame.
         information_of_poses: inverse of the joint covariance of all poses but the first, the faces known no better
-            than contacts tell, shape (p, p).
+            than by the contacts, shape (p, p).
         faces_by_poses: derivatives of each face's tilt and offset by those poses, shape (s d, p).
         faces_by_fingers: change of each face's tilt and offset by one standard deviation of the error that contacts of
             one finger share, while the poses adapt, shape (s d, fingers).

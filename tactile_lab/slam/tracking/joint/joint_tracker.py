@@ -64,7 +64,7 @@ class JointTracker:
             first: map of the first grasp.
             noise: of the motion model.
             settings: see there.
-            kernel_every: kernel parameters are estimated anew after so many grasps.
+            kernel_every: kernel parameters are estimated again after this many grasps.
             relocate: proposes poses anywhere on the object if it was lost; None for none.
         """
         self._relocate, self._configured = relocate, noise
