@@ -1,7 +1,8 @@
 """How large a palm's process data are by its own account.
 
 Of palm 0250 there are headers of two sizes with one product code, so that the code does not determine the layout
-(protocols: Palm 0250). What its EEPROM says of its SyncManagers does; and every palm refuses SyncManagers of another size.
+(protocols: Palm 0250). What its EEPROM says of its SyncManagers does; and every palm refuses SyncManagers of another
+size.
 """
 
 from __future__ import annotations

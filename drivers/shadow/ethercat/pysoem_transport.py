@@ -7,10 +7,10 @@ from the slaves' EEPROMs; a hand whose EEPROM holds its identity alone needs the
 Four weaknesses of SOEM are made good. A lost frame blocks it for several milliseconds, unless its socket is set not
 to block. Then it asks the socket over and over until the answer is there, at the cost of a core: so the answer is
 waited for before SOEM looks. It distinguishes answers by an index of sixteen values only, so that after a stall it
-can continue with old data for ever: a status is used only when it echoes the last command that the palm had taken before. And a
-frame that gets lost while it sets up the ring leaves it with fewer slaves, with other names or process data than
-theirs, or with slaves that refuse what they got: so it is given the patience of the settings, and nothing is refused
-that was not seen in several looks.
+can continue with old data for ever: a status is used only when it echoes the last command that the palm had taken
+before. And a frame that gets lost while it sets up the ring leaves it with fewer slaves, with other names or process
+data than theirs, or with slaves that refuse what they got: so it gets the patience of the settings, and an error must
+show in several scans before the ring is refused.
 """
 
 from __future__ import annotations

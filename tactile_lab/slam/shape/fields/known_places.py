@@ -1,9 +1,9 @@
 """What is known of places without contacts, as evidence for a field: a finger went through, and an object is one piece.
 
 A field is corrected only where it is wrong: of the places where a finger was, those that it takes for the object's
-inside, and, if it parts the object into pieces, the narrowest place between two of them. Each is a value of the field, a small
-distance outside or inside with an uncertainty of the same size. A correction changes the field elsewhere, so this is
-repeated. Kernel and evidence stay as they are.
+inside, and, if it parts the object into pieces, the narrowest place between two of them. Each is a value of the field,
+a small distance outside or inside with an uncertainty of the same size. A correction changes the field elsewhere, so
+this is repeated. Kernel and evidence stay as they are.
 """
 
 from __future__ import annotations
