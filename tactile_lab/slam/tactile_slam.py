@@ -38,14 +38,14 @@ from tactile_lab.slam.doubt.assessment import Assessment, assess
 from tactile_lab.slam.doubt.rivals import displaced
 from tactile_lab.slam.doubt.status import Alternative
 from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
-from tactile_lab.slam.graph.relocation import relocated_rows
+from tactile_lab.slam.graph.relocation import relocated_poses
 from tactile_lab.slam.result import SlamResult, SlamStep, Verdict
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.selection.models import ShapeName
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet, placement_sigma_m
-from tactile_lab.slam.tracking.contacts.first_pose import first_row
+from tactile_lab.slam.tracking.contacts.first_pose import first_pose_vector
 from tactile_lab.slam.tracking.filter.particle_filter import CERTAIN_VARIANCE, PoseEstimate
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanism
@@ -314,16 +314,16 @@ class TactileSlam:
         on_table = self._settings.freedom == "table"
         self._origin_height_m = float(grasp.points_world_m[:, 2].mean()) if on_table else 0.0
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
-        row = first_row(grasp, contacts, on_table=on_table)
+        row = first_pose_vector(grasp, contacts, on_table=on_table)
         first = PlacedGrasp(contacts, row, CERTAIN_VARIANCE * np.eye(self._space.size), np.zeros(self._space.size))
-        relocate = relocated_rows if on_table else None
+        relocate = relocated_poses if on_table else None
         self._tracker = make_tracker(self._settings, first, self._rng, following, relocate)
         return self._record(grasp, contacts, "first", "object frame born", started)
 
     def _judge(self, contacts: ContactSet, estimate: PoseEstimate, explained: bool) -> tuple[Verdict, str]:
         if not explained:
             return "untracked", "no pose explains the contacts" if len(contacts) else "no contacts"
-        spread_m = placement_sigma_m(contacts, estimate.row, estimate.covariance, self._space)
+        spread_m = placement_sigma_m(contacts, estimate.pose, estimate.covariance, self._space)
         if spread_m > self._settings.placement_limit_m:
             return "uncertain", f"contacts uncertain to {1e3 * spread_m:.0f} mm"
         return "tracked", f"contacts placed to {1e3 * spread_m:.1f} mm"
@@ -335,7 +335,7 @@ class TactileSlam:
         step = SlamStep(
             index=grasp.index,
             stamp_ns=grasp.stamp_ns,
-            world_T_object=self._space.pose(placed.row, self._origin_height_m) if placed else None,
+            world_T_object=self._space.pose(placed.pose, self._origin_height_m) if placed else None,
             covariance=placed.covariance if placed else None,
             effective_count=self._tracker.effective_count if self._tracker else 0.0,
             observability=seen,
@@ -355,7 +355,7 @@ class TactileSlam:
 
     def _trajectory(self) -> tuple[Pose3 | None, ...]:
         return tuple(
-            self._space.pose(grasp.row, self._origin_height_m) if grasp else None for grasp in self._placed_grasps()
+            self._space.pose(grasp.pose, self._origin_height_m) if grasp else None for grasp in self._placed_grasps()
         )
 
     def _common_covariances(self) -> tuple[Array | None, ...]:

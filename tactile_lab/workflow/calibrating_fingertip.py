@@ -65,7 +65,7 @@ class FingertipRequest:
 def fingertip_wizard(
     request: FingertipRequest, onlooker: TrafficSink
 ) -> Iterator[tuple[FingertipWizard, FingertipMeasurer]]:
-    """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+    """A wizard with a connected measurer; the hand is lifted off and everything closed in the end.
 
     Args:
         request: see there.

@@ -1,4 +1,4 @@
-"""A forearm-to-world calibration on a rig: the wizard's plan and the station that measures it."""
+"""A forearm-to-world calibration on a rig: the wizard's plan and the measurer that carries it out."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ class ForearmRequest:
 def forearm_wizard(
     request: ForearmRequest, onlooker: TrafficSink
 ) -> Iterator[tuple[ForearmWizard, CalibrationMeasurer]]:
-    """A wizard with a connected station; the hand is lifted off and everything closed in the end.
+    """A wizard with a connected measurer; the hand is lifted off and everything closed in the end.
 
     Args:
         request: see there.

@@ -29,7 +29,9 @@ def camera(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="File to write the result to.", show_default="calibrations/STATION/camera.yaml", callback=writable_file
+            help="File to write the result to.",
+            show_default="calibrations/INSTALLATION/camera.yaml",
+            callback=writable_file,
         ),
     ] = None,
     measurer: Annotated[

@@ -32,7 +32,7 @@ def fingertip(
         Path | None,
         typer.Option(
             help="File to write the result to.",
-            show_default="calibrations/STATION/fingertips.yaml",
+            show_default="calibrations/INSTALLATION/fingertips.yaml",
             callback=writable_file,
         ),
     ] = None,

@@ -43,7 +43,7 @@ def forearm(
         Path | None,
         typer.Option(
             help="File to write the result to.",
-            show_default="calibrations/STATION/forearm.yaml",
+            show_default="calibrations/INSTALLATION/forearm.yaml",
             callback=writable_file,
         ),
     ] = None,

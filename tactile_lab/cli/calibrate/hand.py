@@ -40,7 +40,9 @@ def joints(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="File to write the result to.", show_default="calibrations/STATION/joints.yaml", callback=writable_file
+            help="File to write the result to.",
+            show_default="calibrations/INSTALLATION/joints.yaml",
+            callback=writable_file,
         ),
     ] = None,
     replace: Replace = False,

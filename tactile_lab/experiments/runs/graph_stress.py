@@ -147,7 +147,7 @@ def _gtsam_problem(
         noise: gtsam.noiseModel.Base = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
         if cost is not None and edge.end != edge.start + 1:
             noise = gtsam.noiseModel.Robust.Create(cost, noise)
-        factors.add(gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.row), noise))
+        factors.add(gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.pose), noise))
     return factors, start
 
 

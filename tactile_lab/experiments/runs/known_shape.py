@@ -32,7 +32,7 @@ from tactile_lab.slam.tracking.contacts.motion import (
     deviation,
     planar_motion,
     pose_vector,
-    row_pose_in_space,
+    spatial_pose,
 )
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 from tactile_lab.slam.tracking.filter.measurement import CalibratedMeasurement, CalibratedSettings, Known
@@ -70,7 +70,7 @@ def follow_known_shape(cell: Cell) -> dict[str, Any]:
     first = pose_vector(planar(data.world_T_body[0] * body_T_frame))
     follower = _Follower(mesh, height_m, noise, cell["particles"], rng)
     rows = follower.trajectory(data.grasps, first)
-    poses = [row_pose_in_space(row, height_m) * body_T_frame.inverse() for row in rows]
+    poses = [spatial_pose(row, height_m) * body_T_frame.inverse() for row in rows]
     return {"registration_mm": registration_mm(data, poses, 3), "status": "ok"}
 
 

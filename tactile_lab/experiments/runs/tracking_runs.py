@@ -24,7 +24,7 @@ from tactile_lab.slam.shape.surfaces.surface import Contour
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-from tactile_lab.slam.tracking.contacts.motion import compose, planar_motion, row_pose_in_space
+from tactile_lab.slam.tracking.contacts.motion import compose, planar_motion, spatial_pose
 
 _Data = TypeVar("_Data", bound=SimulatedGrasps)
 Figures: TypeAlias = Callable[[_Data, SlamResult], dict[str, Any]]
@@ -120,7 +120,7 @@ def correct_by_loops(cell: Cell) -> dict[str, Any]:
     chosen = sorted(rng.permutation(len(accepted))[: cell["constraints"]])
     corrected = optimise_poses(drifting, [accepted[i] for i in chosen], settings) if chosen else drifting
     points = [grasp.points_world_m for grasp in data.grasps]
-    poses = [row_pose_in_space(row, 0.0) for row in corrected.rows]
+    poses = [spatial_pose(row, 0.0) for row in corrected.rows]
     return {
         **contour_figures(_outline(corrected), data.outline_m),
         "registration_mm": registration_rms_mm(points, poses, data.world_T_body, 2),

@@ -56,7 +56,7 @@ def heading_hypotheses(
         kept: number of combinations carried along.
     """
     ends = np.array([[loop.start, loop.end] for loop in loops], dtype=np.intp).reshape(-1, 2)
-    turns = np.array([loop.row[2] for loop in loops])
+    turns = np.array([loop.pose[2] for loop in loops])
     variances = np.array([loop.covariance[2, 2] for loop in loops])
     refused_cost = np.log(2 * np.pi) - np.log(wrong_share)
     beam = _start(odometry, len(loops))
@@ -72,7 +72,7 @@ def heading_hypotheses(
 
 
 def _start(odometry: Sequence[RelativePose], loops: int) -> _Beam:
-    steps = np.array([edge.row[2] for edge in odometry])
+    steps = np.array([edge.pose[2] for edge in odometry])
     gathered = np.concatenate([[0.0], np.cumsum([edge.covariance[2, 2] for edge in odometry])])
     return _Beam(
         means=np.concatenate([[0.0], np.cumsum(steps)])[None],

@@ -54,7 +54,7 @@ def gtsam_problem(
 
 
 def _factor(edge: RelativePose, noise: gtsam.noiseModel.Base) -> gtsam.BetweenFactorPose2:
-    return gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.row), noise)
+    return gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.pose), noise)
 
 
 def squared_distances(rows: Array, edges: Sequence[RelativePose]) -> Array:

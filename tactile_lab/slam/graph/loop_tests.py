@@ -90,7 +90,7 @@ def _joint_verdicts(
 ) -> tuple[LoopVerdict, ...]:
     rows = contact_map.rows
     odometry = [
-        RelativePose(k, k + 1, inverse(grasp.motion), _motion_covariance(grasp.row, noise))
+        RelativePose(k, k + 1, inverse(grasp.motion), _motion_covariance(grasp.pose, noise))
         for k, grasp in enumerate(contact_map.placed[1:])
     ]
     edges = [loop_edge(loop, rows) for loop in loops]

@@ -82,9 +82,9 @@ def _assess(contact_map: ContactMap, index: int, noise: MotionNoise, settings: P
     contacts = grasp.contacts_world.select(grasp.kept)
     shape = others.fit()
     found = relocation_candidates(others, contacts, settings.relocation).rows
-    rows = np.vstack([grasp.row, found])
+    rows = np.vstack([grasp.pose, found])
     costs = _contact_costs(rows, contacts, shape, settings) + _motion_costs(rows, contact_map, index, noise)
-    near = np.abs(deviation(rows, grasp.row)) < [settings.same_place_m] * 2 + [settings.same_place_rad]
+    near = np.abs(deviation(rows, grasp.pose)) < [settings.same_place_m] * 2 + [settings.same_place_rad]
     here = near.all(axis=1)
     best_other = int(np.argmin(np.where(here, np.inf, costs)))
     other = None if here.all() else rows[best_other]
@@ -103,7 +103,7 @@ def _doubt(
     grasp: PlacedGrasp, other: Array | None, margin: float, covariance: Array, settings: PlacementSettings
 ) -> str:
     if other is not None and margin < settings.least_margin:
-        gap = deviation(other, grasp.row)
+        gap = deviation(other, grasp.pose)
         away = f"{1e3 * np.hypot(gap[0], gap[1]):.0f} mm and {np.degrees(abs(gap[2])):.0f} degrees away"
         return f"fits as well {away}" if abs(margin) < settings.least_margin else f"fits better {away}"
     sigma_m = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
@@ -135,22 +135,22 @@ def _motion_costs(rows: Array, contact_map: ContactMap, index: int, noise: Motio
     placed = contact_map.placed
     costs = np.zeros(len(rows))
     if index > 0:
-        expected = compose(placed[index].motion, placed[index - 1].row)
+        expected = compose(placed[index].motion, placed[index - 1].pose)
         costs += 0.5 * np.sum((deviation(rows, expected) / noise.sigmas) ** 2, axis=1)
     if index + 1 < len(placed):
         following = compose(placed[index + 1].motion, rows)
-        costs += 0.5 * np.sum((deviation(following, placed[index + 1].row) / noise.sigmas) ** 2, axis=1)
+        costs += 0.5 * np.sum((deviation(following, placed[index + 1].pose) / noise.sigmas) ** 2, axis=1)
     return costs
 
 
 def _covariance(grasp: PlacedGrasp, contacts: ContactSet, shape: Gpis, settings: PlacementSettings) -> Array:
     """Inverse information of the contacts on the shape of the others (Gauss-Newton)."""
-    seen = contacts.in_object_frame(grasp.row)
+    seen = contacts.in_object_frame(grasp.pose)
     found = shape.predict(seen.points_m, gradient=True, variance=True)
     variance = found.variance_m2
     flat = found.gradient[:, :2]
     turning = flat[:, 0] * seen.points_m[:, 1] - flat[:, 1] * seen.points_m[:, 0]
-    slopes = np.column_stack([-flat @ planar_rotation(-grasp.row[2]), turning])
+    slopes = np.column_stack([-flat @ planar_rotation(-grasp.pose[2]), turning])
     weights = 1 / (contacts.point_sigma_m**2 + variance)
     information = slopes.T @ (weights[:, None] * slopes) + np.diag([1.0, 1.0, 1e-2])
     tilt_variance = contacts.normal_sigma_rad**2 + np.minimum(variance / settings.normal_length_m**2, 1.0)

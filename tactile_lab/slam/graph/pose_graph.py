@@ -172,7 +172,7 @@ def _step_covariance(contact_map: ContactMap, index: int, settings: PoseGraphSet
     """The filter's covariance of a pose (3.23), turned from world axes into the object's."""
     grasp = contact_map.placed[index]
     turn = np.eye(3)
-    turn[:2, :2] = vector_pose(grasp.row).rotation().matrix().T
+    turn[:2, :2] = vector_pose(grasp.pose).rotation().matrix().T
     return _believable(turn @ grasp.covariance @ turn.T, settings)
 
 
@@ -219,7 +219,7 @@ def _step(contact_map: ContactMap, index: int, settings: PoseGraphSettings) -> R
 def _factor(edge: RelativePose, cost: gtsam.noiseModel.mEstimator.Base | None = None) -> gtsam.BetweenFactorPose2:
     noise = gtsam.noiseModel.Gaussian.Covariance(edge.covariance)
     robust = noise if cost is None else gtsam.noiseModel.Robust.Create(cost, noise)
-    return gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.row), robust)
+    return gtsam.BetweenFactorPose2(edge.start, edge.end, vector_pose(edge.pose), robust)
 
 
 def explains_better(corrected: ContactMap, present: ContactMap) -> bool:

@@ -18,13 +18,13 @@ class RelativePose:
 
     Attributes:
         start, end: numbers of the nodes.
-        row: the pose (x_m, y_m, yaw_rad) of the end seen from the start, shape (3,).
+        pose: (x_m, y_m, yaw_rad) of the end seen from the start, shape (3,).
         covariance: of a small motion after it, (x, y, yaw) in the end's axes (gtsam's order), shape (3, 3).
     """
 
     start: int
     end: int
-    row: Array
+    pose: Array
     covariance: Array
 
 
@@ -32,7 +32,7 @@ def chain(odometry: Sequence[RelativePose], first: Array) -> Array:
     """Poses of all nodes, shape (n + 1, 3): the first one, and each next one seen from its predecessor."""
     rows = [np.asarray(first, dtype=float)]
     for edge in odometry:
-        rows.append(compose(rows[-1], edge.row))
+        rows.append(compose(rows[-1], edge.pose))
     return np.array(rows)
 
 
@@ -41,7 +41,7 @@ def residuals(rows: Array, edges: Sequence[RelativePose]) -> Array:
     if not edges:
         return np.zeros((0, 3))
     starts, ends = rows[[edge.start for edge in edges]], rows[[edge.end for edge in edges]]
-    gaps = compose(inverse(ends), compose(starts, np.array([edge.row for edge in edges])))
+    gaps = compose(inverse(ends), compose(starts, np.array([edge.pose for edge in edges])))
     gaps[:, 2] = wrap_angle_rad(gaps[:, 2])
     return gaps
 
@@ -51,7 +51,7 @@ def jacobians(rows: Array, edges: Sequence[RelativePose]) -> tuple[Array, Array]
     starts = np.array([edge.start for edge in edges], dtype=np.intp)
     ends = np.array([edge.end for edge in edges], dtype=np.intp)
     seen = compose(inverse(rows[ends]), rows[starts])  # end_T_start
-    arms = np.array([edge.row[:2] for edge in edges]).reshape(-1, 2)
+    arms = np.array([edge.pose[:2] for edge in edges]).reshape(-1, 2)
     cosine, sine = np.cos(seen[:, 2]), np.sin(seen[:, 2])
     by_start = np.zeros((len(edges), 3, 3))
     by_start[:, 0, 0], by_start[:, 0, 1] = cosine, -sine

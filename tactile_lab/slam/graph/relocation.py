@@ -115,7 +115,7 @@ def relocation_candidates(
     return Relocations(*_in_world(poses, np.asarray(np.linalg.inv(information), dtype=np.float64)), scores)
 
 
-def relocated_rows(contact_map: ContactMap, contacts: ContactSet) -> Array:
+def relocated_poses(contact_map: ContactMap, contacts: ContactSet) -> Array:
     """The poses of :func:`relocation_candidates` alone, the best first, shape (m, 3)."""
     return relocation_candidates(contact_map, contacts).rows
 

@@ -163,7 +163,7 @@ class _Problem:
         headings = headings_rad + self.first[2]
         starts = np.array([edge.start for edge in edges])
         ends = np.array([edge.end for edge in edges])
-        arms = np.array([edge.row[:2] for edge in edges])
+        arms = np.array([edge.pose[:2] for edge in edges])
         weights = 1 / np.array([np.trace(edge.covariance[:2, :2]) for edge in edges])
         cosine, sine = np.cos(headings[starts]), np.sin(headings[starts])
         ways = np.column_stack([cosine * arms[:, 0] - sine * arms[:, 1], sine * arms[:, 0] + cosine * arms[:, 1]])

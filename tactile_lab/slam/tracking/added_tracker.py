@@ -63,7 +63,7 @@ class AddedTracker:
 
     def estimate(self) -> PoseEstimate:
         found: PoseEstimate = self._ask(lambda: self._tracker.estimate())
-        self._check(found.row, found.covariance)
+        self._check(found.pose, found.covariance)
         return found
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
@@ -80,7 +80,7 @@ class AddedTracker:
 
     def _placed(self, what: Callable[[], ContactMap]) -> ContactMap:
         found: ContactMap = self._ask(what)
-        self._check(*(grasp.row for grasp in found.placed))
+        self._check(*(grasp.pose for grasp in found.placed))
         return found
 
     def _ask(self, question: Callable[[], Any]) -> Any:

@@ -60,7 +60,7 @@ class IcpTracker(OdometryTracker):
         return self._trusted
 
     def _believable(self, row: Array) -> bool:
-        away = self._map.space.deviation(row, self._now.row)
+        away = self._map.space.deviation(row, self._now.pose)
         return bool(away @ np.linalg.solve(self._now.covariance, away) < len(row) * self._settings.believed**2)
 
     def _register(self, contacts: ContactSet) -> tuple[Array, float] | None:
@@ -69,7 +69,7 @@ class IcpTracker(OdometryTracker):
 
         target, tree = _cloud(self._map.contacts)
         source, _ = _cloud(contacts)
-        start = self._map.space.pose(self._now.row, 0.0)
+        start = self._map.space.pose(self._now.pose, 0.0)
         found = small_gicp.align(
             target,
             source,

@@ -36,7 +36,7 @@ class OdometryTracker:
         self._map, self._noise = first, noise
         self._motion, self._trusted = np.zeros(first.space.size), True
         self._motion_sigma: StepSigma | None = None
-        self._now = PoseEstimate(first.placed[-1].row, first.placed[-1].covariance)
+        self._now = PoseEstimate(first.placed[-1].pose, first.placed[-1].covariance)
 
     @property
     def map(self) -> ContactMap:
@@ -48,7 +48,7 @@ class OdometryTracker:
 
     def predict(self, motion: Array, measured: StepSigma | None = None) -> None:
         """Carry the pose along; its covariance goes with it, and the noise is added."""
-        space, row = self._map.space, self._now.row
+        space, row = self._map.space, self._now.pose
         moved = space.compose(motion, row)
         by_row = space.deviation(space.compose(motion, row + _STEP * np.eye(space.size)), moved).T / _STEP
         noise = self._noise if measured is None else self._noise.after(motion, measured)
@@ -66,7 +66,7 @@ class OdometryTracker:
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         """Contacts are added to the shape at the pose, however uncertain it is: a baseline rejects nothing."""
         now, sigma = self._now, self._motion_sigma
-        placed = PlacedGrasp(contacts, now.row, now.covariance, self._motion, motion_sigma=sigma)
+        placed = PlacedGrasp(contacts, now.pose, now.covariance, self._motion, motion_sigma=sigma)
         self._map = self._map.with_grasp(placed if self._trusted else placed.put_aside())
 
     def resample(self) -> None:
@@ -74,7 +74,7 @@ class OdometryTracker:
 
     def adopt(self, corrected: ContactMap) -> None:
         self._map = corrected
-        self._now = PoseEstimate(corrected.placed[-1].row, corrected.placed[-1].covariance)
+        self._now = PoseEstimate(corrected.placed[-1].pose, corrected.placed[-1].covariance)
 
     def finish(self) -> None:
         """Nothing to do: nothing is estimated."""
@@ -94,7 +94,7 @@ class KnownPoseTracker(OdometryTracker):
         super().__init__(first, noise)
         space, start = first.space, poses[0]
         assert start is not None
-        truth_T_map = start.inverse() * space.pose(first.placed[-1].row, 0.0)
+        truth_T_map = start.inverse() * space.pose(first.placed[-1].pose, 0.0)
         self._ahead = [None if pose is None else space.motion(pose * truth_T_map) for pose in poses[1:]]
         self._given: Array | None = None
         self._scorer = HypothesisScorer(noise, UNEXPLAINED_COST)

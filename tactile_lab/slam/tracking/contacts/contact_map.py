@@ -40,7 +40,7 @@ class PlacedGrasp:
 
     Attributes:
         contacts_world: contacts, world frame.
-        row: pose ``world_T_object`` as (x_m, y_m, yaw_rad).
+        pose: ``world_T_object`` as (x_m, y_m, yaw_rad).
         covariance: of the pose, shape (3, 3).
         motion: the hand's motion since the previous grasp, as a pose vector.
         left_out: indices of the contacts that are not used; the others are part of the shape.
@@ -49,7 +49,7 @@ class PlacedGrasp:
     """
 
     contacts_world: ContactSet
-    row: Array
+    pose: Array
     covariance: Array
     motion: Array
     left_out: frozenset[int] = frozenset()
@@ -117,7 +117,7 @@ class ContactMap:
     @property
     def rows(self) -> Array:
         """Poses of all grasps, shape (n, size)."""
-        return np.array([grasp.row for grasp in self.placed])
+        return np.array([grasp.pose for grasp in self.placed])
 
     @property
     def motions(self) -> Array:
@@ -213,7 +213,7 @@ class ContactMap:
 
     def contacts_of(self, index: int) -> ContactSet:
         """Contacts of one grasp, object frame."""
-        return self.placed[index].contacts_world.in_object_frame(self.placed[index].row, self.space)
+        return self.placed[index].contacts_world.in_object_frame(self.placed[index].pose, self.space)
 
     def with_grasp(self, grasp: PlacedGrasp) -> ContactMap:
         """The map with one more grasp."""
@@ -221,7 +221,7 @@ class ContactMap:
 
     def with_rows(self, rows: Array) -> ContactMap:
         """The map with other poses, shape (n, 3), covariances kept."""
-        placed = [replace(grasp, row=row) for grasp, row in zip(self.placed, rows, strict=True)]
+        placed = [replace(grasp, pose=row) for grasp, row in zip(self.placed, rows, strict=True)]
         moved = replace(self, placed=tuple(placed))
         moved.__dict__.update({name: self.__dict__[name] for name in _WHATEVER_THE_POSES if name in self.__dict__})
         return moved
@@ -232,18 +232,18 @@ class ContactMap:
         The other's poses are brought into this map's object frame. Steps in which the object moved freely are kept.
         """
         space, theirs = self.space, backward.placed[::-1]
-        frame_T_ours = space.compose(space.inverse(theirs[0].row), self.placed[0].row)
+        frame_T_ours = space.compose(space.inverse(theirs[0].pose), self.placed[0].pose)
         steps = (Moved.AS_MEANT, *(their.moved for their in theirs[:-1]))  # what came before ours came after theirs
         placed = [
             replace(
                 our,
-                row=space.compose(their.row, frame_T_ours),
+                pose=space.compose(their.pose, frame_T_ours),
                 left_out=their.left_out,
                 moved=our.moved if our.moved is Moved.FREELY else step,
             )
             for our, their, step in zip(self.placed, theirs, steps, strict=True)
         ]
-        first = replace(placed[0], row=self.placed[0].row)  # equal but for rounding
+        first = replace(placed[0], pose=self.placed[0].pose)  # equal but for rounding
         return replace(self, placed=(first, *placed[1:]))
 
     def fit(self) -> Gpis:

@@ -137,7 +137,7 @@ def vector_pose(row: Array) -> Pose2:
     return Pose2(float(row[0]), float(row[1]), float(row[2]))
 
 
-def row_pose_in_space(row: Array, height_m: float) -> Pose3:
+def spatial_pose(row: Array, height_m: float) -> Pose3:
     """The pose in space of a planar pose vector, its origin at the given height above the table."""
     return spatial(vector_pose(row), height_m)
 

@@ -20,7 +20,7 @@ from tactile_lab.slam.tracking.contacts.motion import (
     deviation,
     inverse,
     planar_motion,
-    row_pose_in_space,
+    spatial_pose,
 )
 
 
@@ -105,7 +105,7 @@ class PlanarVectors:
         return planar_motion(hand_motion_world)
 
     def pose(self, row: Array, height_m: float) -> Pose3:
-        return row_pose_in_space(row, height_m)
+        return spatial_pose(row, height_m)
 
     def to_object(self, rows: Array, points: Array, normals: Array) -> tuple[Array, Array]:
         cosine, sine = np.cos(rows[..., 2]), np.sin(rows[..., 2])

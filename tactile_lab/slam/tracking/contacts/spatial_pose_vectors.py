@@ -42,9 +42,9 @@ class SpatialVectors:
         return np.asarray(result)
 
     def motion(self, hand_motion_world: Pose3) -> Array:
-        return self.row(hand_motion_world)
+        return self.vector(hand_motion_world)
 
-    def row(self, pose: Pose3) -> Array:
+    def vector(self, pose: Pose3) -> Array:
         return np.concatenate([pose.translation(), logarithm(pose.rotation().matrix())])
 
     def pose(self, row: Array, height_m: float) -> Pose3:

@@ -30,12 +30,12 @@ def condense(contact_map: ContactMap, window: int, remembered: int) -> ContactMa
     archived = old[1:] if contact_map.archive else old
     before = replace(contact_map, placed=old)
     seen, last = before.contacts, old[-1]
-    back = contact_map.space.inverse(last.row)
+    back = contact_map.space.inverse(last.pose)
     chosen = seen.select(_spread_out(seen, remembered)).in_object_frame(back, contact_map.space)
     free, _ = contact_map.space.to_object(back, before.free_points_m, before.free_points_m)
     free = _every(free, 2 * remembered)
     world = replace(chosen, free_m=free, free_of=np.full(len(free), -1))
-    summary = PlacedGrasp(world, last.row, last.covariance, np.zeros_like(last.row))
+    summary = PlacedGrasp(world, last.pose, last.covariance, np.zeros_like(last.pose))
     return replace(contact_map, placed=(summary, *recent), archive=contact_map.archive + archived)
 
 

@@ -26,7 +26,7 @@ from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother, smoothed_with_faces
 from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
 from tactile_lab.slam.tracking.faces.regular_faces import made_regular
-from tactile_lab.slam.tracking.faces.solid_face_extents import solid_ends
+from tactile_lab.slam.tracking.faces.solid_face_extents import solid_face_extents
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 
@@ -95,7 +95,7 @@ class FacetedScorer:
         """Poses and faces in space smoothed together, with contacts within their faces; otherwise None."""
         try:
             faces, _ = flat_faces(contact_map)
-            ends = solid_ends(contact_map, faces)
+            ends = solid_face_extents(contact_map, faces)
         except ShapeError:
             return None
         found = FacetSmoother(contact_map, self._noise, ends).fit(contact_map.rows, faces, _SETTLING_STEPS)
@@ -107,7 +107,7 @@ class FacetedScorer:
             return best
         try:
             faces, _ = flat_faces(best.map)
-            ends = solid_ends(best.map, faces) if best.map.dimension == 3 else None
+            ends = solid_face_extents(best.map, faces) if best.map.dimension == 3 else None
         except ShapeError:
             return best
         smoother = FacetSmoother(best.map, self._noise, ends)

@@ -156,7 +156,7 @@ def _try(contact_map: ContactMap, place: _Place, sharp: FacetedScorer) -> Hypoth
     """The map with grasps at another place, smoothed; None if its faces enclose nothing."""
     moved = contact_map
     for index, row in enumerate(place.rows, start=place.index):
-        whole = replace(moved.placed[index], row=row, left_out=frozenset(), moved=Moved.AS_MEANT)
+        whole = replace(moved.placed[index], pose=row, left_out=frozenset(), moved=Moved.AS_MEANT)
         moved = moved.with_placed(index, whole)
     return sharp.settle(moved) if contact_map.dimension == 3 else sharp.smooth(moved)
 

@@ -1,7 +1,7 @@
 """Extents of the faces of a solid: where neighbouring faces meet in a ridge or a notch.
 
-In the plane the corners follow from the order of the faces (:mod:`face_ends`); in space they follow from the body that
-the planes enclose.
+In the plane the corners follow from the order of the faces (:mod:`face_extents`); in space they follow from the body
+that the planes enclose.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class SolidFaceExtents:
         return np.asarray(self.strengths * over_m)
 
 
-def solid_ends(contact_map: ContactMap, faces: FlatFaces) -> SolidFaceExtents:
+def solid_face_extents(contact_map: ContactMap, faces: FlatFaces) -> SolidFaceExtents:
     """The ends of the faces that a map's contacts lie on, for contacts that do not lie beyond them already.
 
     Args:

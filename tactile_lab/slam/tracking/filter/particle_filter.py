@@ -18,11 +18,11 @@ class PoseEstimate:
     """An estimate of ``world_T_object`` in the plane.
 
     Attributes:
-        row: (x_m, y_m, yaw_rad).
+        pose: (x_m, y_m, yaw_rad).
         covariance: shape (3, 3), of the same components.
     """
 
-    row: Array
+    pose: Array
     covariance: Array
 
 

@@ -40,7 +40,7 @@ class ParticleTracker:
         """
         self._map, self._measurement, self._noise, self._rng = first, measurement, noise, rng
         self._kernel_every, self._field_of = kernel_every, field_of
-        self._belief = Belief.certain(first.placed[-1].row, particles)
+        self._belief = Belief.certain(first.placed[-1].pose, particles)
         self._motion = np.zeros(3)
         self._motion_sigma: StepSigma | None = None
         self.effective_count = float(particles)
@@ -73,7 +73,7 @@ class ParticleTracker:
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         estimate = self.estimate()
-        grasp = PlacedGrasp(contacts, estimate.row, estimate.covariance, self._motion, motion_sigma=self._motion_sigma)
+        grasp = PlacedGrasp(contacts, estimate.pose, estimate.covariance, self._motion, motion_sigma=self._motion_sigma)
         self._map = self._map.with_grasp(grasp if certain else grasp.put_aside())
         if certain and len(self._map.placed) % self._kernel_every == 0:
             self._map = self._map.with_best_kernel()
@@ -83,7 +83,7 @@ class ParticleTracker:
 
     def adopt(self, corrected: ContactMap) -> None:
         """Take over poses corrected by the graph; the particles move along with the last pose."""
-        change = compose(corrected.placed[-1].row, inverse(self._map.placed[-1].row))
+        change = compose(corrected.placed[-1].pose, inverse(self._map.placed[-1].pose))
         self._belief = Belief(compose(change, self._belief.rows), self._belief.weights)
         self._map = corrected
 

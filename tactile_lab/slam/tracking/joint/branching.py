@@ -47,7 +47,7 @@ class Branching:
     def _leave_unplaced(self, hypothesis: Hypothesis) -> Hypothesis:
         """All contacts of the grasp left out: the motion model alone says where the object is."""
         last = hypothesis.map.placed[-1]
-        row = self.space.compose(self.motion, last.row)
+        row = self.space.compose(self.motion, last.pose)
         noise = self.noise.after(self.motion, self.motion_sigma)
         covariance = last.covariance + np.diag(self.space.sigmas(noise) ** 2)
         grasp = PlacedGrasp(self.contacts, row, covariance, self.motion, motion_sigma=self.motion_sigma).put_aside()
@@ -77,7 +77,7 @@ class Branching:
         before = placed[len(placed) - unplaced :]
         motions = np.array([self.motion, *(grasp.motion for grasp in before)])
         noise = self.noise.over(motions, [self.motion_sigma, *(grasp.motion_sigma for grasp in before)])
-        predicted = self.space.compose(self.motion, hypothesis.map.placed[-1].row)
+        predicted = self.space.compose(self.motion, hypothesis.map.placed[-1].pose)
         fitted = hypothesis.map.fit()
         rows, fit = propose(predicted, self.contacts, fitted, noise, self.settings.proposals, self.space)
         places, _ = self.space.to_object(rows[:, None], self.contacts.free_m, self.contacts.free_m)

@@ -115,7 +115,7 @@ def _was_left(grasp: PlacedGrasp, noise: MotionNoise) -> bool:
 def _near(hypothesis: Hypothesis, index: int, noise: MotionNoise, settings: ProposalSettings) -> Array:
     """Poses of a grasp on the object of all others, near where the motion leads, the best first."""
     space, grasp = hypothesis.map.space, hypothesis.map.placed[index]
-    predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].row)
+    predicted = space.compose(grasp.motion, hypothesis.map.placed[index - 1].pose)
     field = hypothesis.map.without_grasp(index).fit()
     return propose(predicted, grasp.contacts_world, field, noise, settings, space)[0][:_TRIED_NEAR]
 
@@ -130,7 +130,7 @@ def _place_at(
     """The hypothesis with one grasp at the most likely poses that enough contacts fit, smoothed."""
     found = []
     for row in rows:
-        grasp = replace(hypothesis.map.placed[index], row=row, left_out=frozenset(), moved=moved)
+        grasp = replace(hypothesis.map.placed[index], pose=row, left_out=frozenset(), moved=moved)
         cleaned, _ = scorer.clean(_with(hypothesis.map, index, grasp), index)
         if len(cleaned.placed[index].kept) >= fitting:
             found.append(scorer.score(cleaned))
@@ -152,6 +152,6 @@ def _with(contact_map: ContactMap, index: int, grasp: PlacedGrasp) -> ContactMap
         if any(one.used for one in placed[index + 1 : after]):
             break
         placed[after] = replace(
-            placed[after], row=contact_map.space.compose(placed[after].motion, placed[after - 1].row)
+            placed[after], pose=contact_map.space.compose(placed[after].motion, placed[after - 1].pose)
         )
     return replace(contact_map, placed=tuple(placed))

@@ -163,10 +163,10 @@ class JointTracker:
     def estimate(self) -> PoseEstimate:
         """The most likely hypothesis's pose; the covariance includes its own and the spread of the hypotheses."""
         best = self._branches[0].map.placed[-1]
-        rows = np.array([branch.map.placed[-1].row for branch in self._branches])
-        away = self._space.deviation(rows, best.row)
+        rows = np.array([branch.map.placed[-1].pose for branch in self._branches])
+        away = self._space.deviation(rows, best.pose)
         spread = (away * weights(self._branches)[:, None]).T @ away
-        return PoseEstimate(best.row, best.covariance + spread)
+        return PoseEstimate(best.pose, best.covariance + spread)
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
         """Nothing to do: the branches contain the new contacts already."""

@@ -41,7 +41,7 @@ def test_the_object_is_told_where_its_surface_is() -> None:
         assert told is not None
         assert slam.world_T_object is not None
         assert told.equals(slam.world_T_object, 1e-12)
-        followed = slam._tracker.map.placed[-1].row if slam._tracker else None
+        followed = slam._tracker.map.placed[-1].pose if slam._tracker else None
         moved.append(followed is not None and abs(told.x() - followed[0]) > 1e-6)
     assert any(moved)  # the surface's contacts are smoothed with faces, beside the trajectory that is followed
 

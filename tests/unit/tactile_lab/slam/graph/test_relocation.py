@@ -28,7 +28,9 @@ def near(rows: Array, true: Array) -> Array:
 def test_the_true_pose_is_among_the_proposals_wherever_the_hand_was_believed_to_be(shape: str) -> None:
     contact_map = true_map(shape, seed=1, count=14)
     found = [
-        near(relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world).rows, placed.row).any()
+        near(
+            relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world).rows, placed.pose
+        ).any()
         for k, placed in enumerate(contact_map.placed)
         if k >= 6
     ]
@@ -38,7 +40,7 @@ def test_the_true_pose_is_among_the_proposals_wherever_the_hand_was_believed_to_
 def test_a_shape_without_symmetry_has_the_true_pose_first() -> None:
     contact_map = true_map("hexagon", seed=2, count=14)
     first = [
-        near(relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world).rows[:1], placed.row)
+        near(relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world).rows[:1], placed.pose)
         for k, placed in enumerate(contact_map.placed)
         if k >= 8
     ]
@@ -48,7 +50,7 @@ def test_a_shape_without_symmetry_has_the_true_pose_first() -> None:
 def test_a_rectangle_s_half_turn_is_proposed_as_well() -> None:
     contact_map = true_map("rectangle", seed=1, count=14)
     found = relocation_candidates(before(contact_map, 13), contact_map.placed[13].contacts_world)
-    turns = np.abs(deviation(found.rows, contact_map.placed[13].row)[:, 2])
+    turns = np.abs(deviation(found.rows, contact_map.placed[13].pose)[:, 2])
     assert np.any(turns > np.deg2rad(170.0))
 
 
@@ -69,9 +71,9 @@ def test_covariances_tell_the_true_errors() -> None:
         contact_map = true_map("hexagon", seed, count=14)
         for k in range(8, 14):
             found = relocation_candidates(before(contact_map, k), contact_map.placed[k].contacts_world)
-            hits = np.flatnonzero(near(found.rows, contact_map.placed[k].row))
+            hits = np.flatnonzero(near(found.rows, contact_map.placed[k].pose))
             if len(hits):
-                gap = deviation(found.rows[hits[0]], contact_map.placed[k].row)
+                gap = deviation(found.rows[hits[0]], contact_map.placed[k].pose)
                 values.append(gap @ np.linalg.solve(found.covariances[hits[0]], gap))
     assert len(values) >= 12
     assert 1.0 < np.mean(values) < 8.0  # chi-square with three degrees of freedom
@@ -109,5 +111,5 @@ def test_in_space_heights_must_fit() -> None:
     contacts = flat.placed[12].contacts_world
     level = relocation_candidates(before(raised, 12), lifted(contacts, 0.02))
     above = relocation_candidates(before(raised, 12), lifted(contacts, 0.09))
-    assert near(level.rows, flat.placed[12].row).any()
+    assert near(level.rows, flat.placed[12].pose).any()
     assert level.scores[0] < above.scores[0]

@@ -139,7 +139,7 @@ def with_aliases(loops: list[RelativePose], share: float, seed: int) -> tuple[li
     wrong = rng.random(len(loops)) < share
     turns = rng.choice([np.pi / 2, np.pi, -np.pi / 2], len(loops))
     spoiled = [
-        RelativePose(e.start, e.end, compose(e.row, np.array([*rng.normal(0.0, 1.0, 2), turn])), e.covariance)
+        RelativePose(e.start, e.end, compose(e.pose, np.array([*rng.normal(0.0, 1.0, 2), turn])), e.covariance)
         if bad
         else e
         for e, turn, bad in zip(loops, turns, wrong, strict=True)

@@ -17,8 +17,8 @@ from tactile_lab.slam.tracking.contacts.motion import (
     inverse,
     planar_motion,
     pose_vector,
-    row_pose_in_space,
     sample_motion,
+    spatial_pose,
     vector_pose,
 )
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
@@ -80,7 +80,7 @@ def test_noise_must_be_positive() -> None:
 
 
 def test_a_row_in_space_stands_at_the_given_height() -> None:
-    pose = row_pose_in_space(pose_vector(Pose2(0.1, 0.2, 0.3)), 0.022)
+    pose = spatial_pose(pose_vector(Pose2(0.1, 0.2, 0.3)), 0.022)
     assert np.allclose(pose.translation(), [0.1, 0.2, 0.022])
     assert pose.rotation().yaw() == pytest.approx(0.3)
 

@@ -80,12 +80,12 @@ def test_poses_are_searched_where_an_unmeasured_step_may_lead() -> None:
     """The contacts say 8 mm from where the step leads, with 1 mm: half of the samples look there."""
     known = true_map("L", count=6)
     last, field = known.placed[-1], known.without_grasp(5).fit()
-    predicted = last.row + np.array([0.006, -0.005, 0.0])
+    predicted = last.pose + np.array([0.006, -0.005, 0.0])
     noise = USUAL.after(np.ones(3), OWN)
     found, _ = propose(predicted, last.contacts_world, field, noise, ProposalSettings())
-    nearest = np.linalg.norm((found - last.row)[:, :2], axis=1).min()
+    nearest = np.linalg.norm((found - last.pose)[:, :2], axis=1).min()
     assert nearest < 0.003
     match = GraspMatch(predicted, last.contacts_world, field, noise, ProposalSettings())
-    fit = match.fit(last.row[None], match.variance(last.row[None]))
+    fit = match.fit(last.pose[None], match.variance(last.pose[None]))
     assert np.isfinite(fit.cost).all()
     assert np.linalg.eigvalsh(fit.information[0]).min() > 0

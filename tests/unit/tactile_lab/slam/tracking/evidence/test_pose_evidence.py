@@ -13,7 +13,7 @@ from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.slam.shape.fields.kernels import Kernel, Matern52, SquaredExponential, ThinPlate, covariance
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, deviation, row_pose_in_space
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, deviation, spatial_pose
 from tactile_lab.slam.tracking.evidence.evidence_kernels import assemble, pull
 from tactile_lab.slam.tracking.evidence.motion_cost import estimated_noise
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence, third_derivative
@@ -93,7 +93,7 @@ def spread_m(contact_map: ContactMap, rows: Array) -> float:
     """How far contacts placed by these poses stray from where the true poses place them, after the best rigid fit."""
     points = [grasp.contacts_world.points_m for grasp in contact_map.placed]
     spatial_points = [np.column_stack([planar_points, np.zeros(len(planar_points))]) for planar_points in points]
-    poses = [[row_pose_in_space(row, 0.0) for row in each] for each in (rows, contact_map.rows)]
+    poses = [[spatial_pose(row, 0.0) for row in each] for each in (rows, contact_map.rows)]
     error = registration_rms_mm(spatial_points, poses[0], poses[1], 2)
     assert error is not None
     return 1e-3 * error
@@ -157,7 +157,7 @@ def test_a_grasp_without_contacts_follows_the_motion_model() -> None:
     last = contact_map.placed[-1]
     empty = PlacedGrasp(
         last.contacts_world.select(np.zeros(len(last.contacts_world), dtype=bool)),
-        last.row + 0.01,
+        last.pose + 0.01,
         last.covariance,
         last.motion,
     )
@@ -177,7 +177,7 @@ def test_proposals_contain_the_true_pose() -> None:
     last = contact_map.placed[7]
     predicted = compose(last.motion, contact_map.rows[6])
     rows, fit = propose(predicted, last.contacts_world, known.fit(), NOISE, ProposalSettings())
-    gaps = deviation(rows, last.row)
+    gaps = deviation(rows, last.pose)
     assert np.any((np.hypot(gaps[:, 0], gaps[:, 1]) < 0.004) & (np.abs(gaps[:, 2]) < 0.1))
     assert np.all(np.diff(fit.cost) >= 0)
 
@@ -186,7 +186,7 @@ def test_proposals_differ_from_each_other() -> None:
     contact_map = true_map("ellipse", count=5)
     settings = ProposalSettings(kept=5)
     last = contact_map.placed[-1]
-    rows, _ = propose(last.row, last.contacts_world, contact_map.fit(), NOISE, settings)
+    rows, _ = propose(last.pose, last.contacts_world, contact_map.fit(), NOISE, settings)
     assert len(rows) <= 5
     for index, row in enumerate(rows):
         gaps = deviation(np.delete(rows, index, axis=0), row)
@@ -198,8 +198,8 @@ def test_proposals_differ_from_each_other() -> None:
 def test_the_information_is_a_second_derivative_near_a_good_fit() -> None:
     contact_map = true_map("rectangle", count=8)
     last = contact_map.placed[-1]
-    match = GraspMatch(last.row, last.contacts_world, contact_map.fit(), NOISE, ProposalSettings())
-    fit = match.fit(last.row[None], match.variance(last.row[None]))
+    match = GraspMatch(last.pose, last.contacts_world, contact_map.fit(), NOISE, ProposalSettings())
+    fit = match.fit(last.pose[None], match.variance(last.pose[None]))
     sigma = np.sqrt(np.diag(np.linalg.inv(fit.information[0])))
     assert np.all(sigma[:2] < 0.004)
     assert sigma[2] < 0.1

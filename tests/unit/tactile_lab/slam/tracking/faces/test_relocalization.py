@@ -15,7 +15,7 @@ from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
 from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
-from tactile_lab.slam.tracking.faces.solid_face_extents import solid_ends
+from tactile_lab.slam.tracking.faces.solid_face_extents import solid_face_extents
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
 from tactile_lab.slam.tracking.joint.proposals import ProposalSettings
 from tests.support.simulated_contacts import true_map
@@ -47,7 +47,7 @@ def rated(contact_map: ContactMap) -> Hypothesis:
 
 def test_contacts_lie_before_the_ends_of_their_faces(l_block: ContactMap) -> None:
     faces, _ = flat_faces(l_block)
-    ends = solid_ends(l_block, faces)
+    ends = solid_face_extents(l_block, faces)
     beyond = ends.beyond(l_block.contacts.points_m, faces.normals, faces.offsets_m)
     assert len(beyond) > 2 * len(l_block.contacts)  # ridges on both sides and above
     assert beyond.max() < 3
@@ -57,7 +57,7 @@ def test_contacts_lie_before_the_ends_of_their_faces(l_block: ContactMap) -> Non
 
 def test_ends_hold_what_would_slide_off(l_block: ContactMap) -> None:
     faces, _ = flat_faces(l_block)
-    ends = solid_ends(l_block, faces)
+    ends = solid_face_extents(l_block, faces)
     beyond, off_m = [], []
     for given in (None, ends):
         found = FacetSmoother(l_block, NOISE, given).fit(moved(l_block, 7, [0.03, 0.0, 0.0]).rows, faces, 30)
@@ -71,7 +71,7 @@ def test_ends_hold_what_would_slide_off(l_block: ContactMap) -> None:
 def test_smoothing_between_ends_takes_the_steepest_way(l_block: ContactMap) -> None:
     """Derivatives that were wrong would make the optimiser stop early or not at all."""
     faces, _ = flat_faces(l_block)
-    ends = solid_ends(l_block, faces)
+    ends = solid_face_extents(l_block, faces)
     smoother = FacetSmoother(l_block, NOISE, ends)
     loose = FacetSmoother(l_block, NOISE).fit(l_block.rows, faces, 30)
     settled = smoother.fit(loose.rows, loose.faces, 6)

@@ -11,7 +11,7 @@ from tactile_lab.slam.tracking.filter.particle_filter import Belief
 
 def test_a_certain_belief_has_no_covariance() -> None:
     estimate = Belief.certain(np.array([0.1, 0.2, 3.1]), 100).estimate()
-    assert np.allclose(estimate.row, [0.1, 0.2, 3.1])
+    assert np.allclose(estimate.pose, [0.1, 0.2, 3.1])
     assert np.allclose(estimate.covariance, 0.0)
 
 
@@ -45,7 +45,7 @@ def test_covariance_is_that_of_the_weighted_particles() -> None:
 def test_angles_are_averaged_across_the_wrap() -> None:
     rows = np.array([[0, 0, np.pi - 0.1], [0, 0, -np.pi + 0.1]])
     estimate = Belief(rows, np.array([0.5, 0.5])).estimate()
-    assert abs(estimate.row[2]) == pytest.approx(np.pi)
+    assert abs(estimate.pose[2]) == pytest.approx(np.pi)
     assert estimate.covariance[2, 2] == pytest.approx(0.01)
 
 

@@ -33,8 +33,8 @@ def with_wrong_contacts(known: ContactMap, wrong: int) -> ContactMap:
     off[:wrong] = FAR_OFF_m[:wrong]
     normals = np.where(off != 0, contacts.normals[:, ::-1] * [1, -1], contacts.normals)
     spoilt = replace(contacts, points_m=contacts.points_m + off, normals=normals)
-    row = known.space.compose(grasp.motion, known.placed[LATE - 1].row)
-    aside = replace(grasp, contacts_world=spoilt, row=row).put_aside()
+    row = known.space.compose(grasp.motion, known.placed[LATE - 1].pose)
+    aside = replace(grasp, contacts_world=spoilt, pose=row).put_aside()
     return replace(known, placed=(*known.placed[:LATE], aside, *known.placed[LATE + 1 :]))
 
 

@@ -116,8 +116,8 @@ def test_an_object_held_free_in_space_is_doubted_too() -> None:
     data = spatial_data.simulate("ellipsoid", 0, motion="free", motion_scale=0.5, count=8)
     placed = []
     for grasp, pose in zip(data.grasps, data.world_T_body, strict=True):
-        contacts, motion = ContactSet.of_grasp(grasp, 3, 0.0), SPATIAL.row(grasp.hand_motion_world)
-        placed.append(PlacedGrasp(contacts, SPATIAL.row(pose), np.eye(6) * 1e-6, motion))
+        contacts, motion = ContactSet.of_grasp(grasp, 3, 0.0), SPATIAL.vector(grasp.hand_motion_world)
+        placed.append(PlacedGrasp(contacts, SPATIAL.vector(pose), np.eye(6) * 1e-6, motion))
     held = ContactMap(tuple(placed), GpisSettings(), SPATIAL)
     model = GpisShape(held.fit())
     given = model.mesh(COARSE_m)
