@@ -20,11 +20,10 @@ from drivers.camera.packet import encode_packet
 from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import CameraSourceSettings
 from drivers.camera.sources import open_source
-from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, MonotonicClock
 from drivers.core.configuration import validate
-from drivers.core.errors import DeviceError, TactileLabError
-from drivers.core.records import RecordKind, RecordPipe
+from drivers.core.errors import DeviceError
+from drivers.core.records import RecordKind, RecordPipe, report_failure
 
 _FILES = ("folder", "video")
 
@@ -105,7 +104,7 @@ def main() -> None:
     """Open the source that the first line names, process its frames, and close it."""
     cv2.setNumThreads(1)
     clock, pipe = MonotonicClock(), RecordPipe(sys.stdout.fileno())
-    try:
+    with report_failure(pipe, clock):
         settings = validate(json.loads(sys.stdin.readline()), CameraSourceSettings, where="camera")
         source = open_source(settings, clock)
         try:
@@ -114,14 +113,6 @@ def main() -> None:
             CameraWorker(source, settings, pipe).run()
         finally:
             source.close()
-    except TactileLabError as error:
-        pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
-        sys.exit(error.exit_code)
-    except Exception as error:
-        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
-        raise
-    finally:
-        pipe.close()
 
 
 if __name__ == "__main__":

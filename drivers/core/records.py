@@ -9,10 +9,15 @@ from __future__ import annotations
 import fcntl
 import os
 import struct
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import IntEnum
 
-from drivers.core.errors import CodecError
+from drivers.core.child_process import failure
+from drivers.core.clock import Clock
+from drivers.core.errors import CodecError, TactileLabError
 
 _HEAD = struct.Struct("<BIq")
 _BACKLOG_BYTES, _PIPE_BYTES = 4_000_000, 1_048_576
@@ -124,3 +129,22 @@ class RecordPipe:
         self.flush()
         while self._backlog:
             self.flush()
+
+
+@contextmanager
+def report_failure(pipe: RecordPipe, clock: Clock) -> Iterator[None]:
+    """Around all that a device's own process does: a failure becomes its last record, and the pipe is closed.
+
+    Raises:
+        SystemExit: with the exit code of the error, after its record.
+    """
+    try:
+        yield
+    except TactileLabError as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
+        sys.exit(error.exit_code)
+    except Exception as error:
+        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
+        sys.exit(1)
+    finally:
+        pipe.close()

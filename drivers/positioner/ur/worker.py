@@ -13,13 +13,12 @@ import sys
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, Clock, MonotonicClock
 from drivers.core.configuration import validate
 from drivers.core.contacts import Array
-from drivers.core.errors import DeviceError, TactileLabError
+from drivers.core.errors import DeviceError
 from drivers.core.orders import Order, OrderReader
-from drivers.core.records import RecordKind, RecordPipe
+from drivers.core.records import RecordKind, RecordPipe, report_failure
 from drivers.positioner.ur.checks import is_reachable, stop_cause
 from drivers.positioner.ur.codec import (
     ArmCommand,
@@ -157,22 +156,16 @@ def main() -> None:
     orders = OrderReader(sys.stdin.fileno())
     arm: RtdeArm | None = None
     try:
-        first: dict[str, Any] = orders.first()
-        settings = validate(first["settings"], UrSettings, where=first["name"])
-        arm = RtdeArm(first["host"], settings, clock, first["name"])
-        found = arm.connect()
-        pipe.put(RecordKind.READY, clock.now_ns(), json.dumps({"found": found}).encode())
-        pipe.flush()
-        request_real_time(_PRIORITY)
-        stream(UrWorker(arm, settings, pipe, clock), orders, clock, settings.cycle_s)
-    except TactileLabError as error:
-        pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
-        sys.exit(error.exit_code)
-    except Exception as error:
-        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
-        sys.exit(1)
+        with report_failure(pipe, clock):
+            first: dict[str, Any] = orders.first()
+            settings = validate(first["settings"], UrSettings, where=first["name"])
+            arm = RtdeArm(first["host"], settings, clock, first["name"])
+            found = arm.connect()
+            pipe.put(RecordKind.READY, clock.now_ns(), json.dumps({"found": found}).encode())
+            pipe.flush()
+            request_real_time(_PRIORITY)
+            stream(UrWorker(arm, settings, pipe, clock), orders, clock, settings.cycle_s)
     finally:
-        pipe.close()
         if arm is not None:
             arm.close()
 

@@ -14,12 +14,11 @@ import json
 import sys
 import time
 
-from drivers.core.child_process import failure
 from drivers.core.clock import NANOSECONDS, Clock, MonotonicClock
-from drivers.core.errors import DeviceError, TactileLabError
+from drivers.core.errors import DeviceError
 from drivers.core.extensions import load_named_extensions
 from drivers.core.orders import Order, OrderReader
-from drivers.core.records import RecordKind, RecordPipe
+from drivers.core.records import RecordKind, RecordPipe, report_failure
 from drivers.core.transports import TappedTransport
 from drivers.shadow.device.cycle_pace import CyclePace
 from drivers.shadow.device.cycle_statistics import CycleStatistics
@@ -164,7 +163,7 @@ def main() -> None:
     """Connect what the first order names, drive it, close it."""
     orders, clock, pipe = OrderReader(sys.stdin.fileno()), MonotonicClock(), RecordPipe(sys.stdout.fileno())
     start = orders.first()
-    try:
+    with report_failure(pipe, clock):
         load_named_extensions()
         setup = HandSetup.model_validate(start["setup"])
         transport = setup.transport(clock)
@@ -179,14 +178,6 @@ def main() -> None:
             HandWorker(hand, transport, setup.motor_map(), pipe, orders, clock, cycle_ns, patience_ns).run()
         finally:
             hand.close()
-    except TactileLabError as error:
-        pipe.put(RecordKind.ERROR, clock.now_ns(), str(error).encode())
-        sys.exit(error.exit_code)
-    except Exception as error:
-        pipe.put(RecordKind.ERROR, clock.now_ns(), failure(error).encode())
-        raise
-    finally:
-        pipe.close()
 
 
 def _identity(transport: HandLink) -> dict[str, object]:

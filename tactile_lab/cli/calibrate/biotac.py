@@ -11,6 +11,7 @@ import typer
 if TYPE_CHECKING:
     from drivers.biotac.normal_training import MethodErrors
 
+from tactile_lab.cli.calibrate.options import Notes
 from tactile_lab.cli.calibrate.steps import OUTSIDE
 from tactile_lab.cli.options import Json, NoInput, writable_file
 
@@ -31,7 +32,7 @@ def biotac(
         Path | None, typer.Option(help="Text file of normals, if RECORDING is a text file with electrodes only.")
     ] = None,
     finger: Annotated[Finger, typer.Option(help="Finger that carries the sensor.")] = Finger.FF,
-    measurer: Annotated[
+    installation: Annotated[
         str, typer.Option("--rig", help="Installation (of the rig file) that the calibration is for.")
     ] = "sim",
     serial: Annotated[str, typer.Option(help="Serial number of the sensor.")] = "",
@@ -48,7 +49,7 @@ def biotac(
             "--sensor-frame", help="The normals are in the BioTac frame; otherwise the rotation is estimated."
         ),
     ] = False,
-    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
+    notes: Notes = "",
     as_json: Json = False,
     no_input: NoInput = False,
 ) -> None:
@@ -70,7 +71,7 @@ def biotac(
     del no_input
     found = calibrate_normals(read_presses(recording, normals), in_sensor_frame=sensor_frame)
     if out is not None:
-        record = normals_record(found, finger, measurer, serial=serial, notes=notes, earlier=out)
+        record = normals_record(found, finger, installation, serial=serial, notes=notes, earlier=out)
         out = target_file(out, record)
         write_record(out, record)
     if as_json:

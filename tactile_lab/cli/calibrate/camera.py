@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import Json, NoInput, writable_file
+from tactile_lab.cli.calibrate.options import Notes, Replace, result_file
+from tactile_lab.cli.options import Json, NoInput
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -26,15 +27,8 @@ def camera(
         Path | None,
         typer.Option(help="Description of the board, from 'tactile-lab markers', or Kalibr's target file."),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="File to write the result to.",
-            show_default="calibrations/INSTALLATION/camera.yaml",
-            callback=writable_file,
-        ),
-    ] = None,
-    measurer: Annotated[
+    out: Annotated[Path | None, result_file("camera")] = None,
+    installation: Annotated[
         str, typer.Option(help="Installation (of the rig file) that the camera belongs to.")
     ] = "laboratory",
     serial: Annotated[str, typer.Option(help="Serial number of the camera.")] = "",
@@ -46,8 +40,8 @@ def camera(
     third_radial: Annotated[
         bool, typer.Option("--k3", help="Estimate a third radial distortion coefficient, for wide lenses.")
     ] = False,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
-    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
+    replace: Replace = False,
+    notes: Notes = "",
     view: View = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",
@@ -73,7 +67,7 @@ def camera(
     from tactile_lab.cli.calibrate.wizard import may_write, wizard
     from tactile_lab.workflow.calibrating_camera import LENS_COMMENT, gather_views, lens_record
 
-    file = out or Path("calibrations") / measurer / "camera.yaml"
+    file = out or Path("calibrations") / installation / "camera.yaml"
     page = PageAddress.if_wanted(view, listen, view_port, token, certificate)
     with wizard("calibrate camera", no_input, page) as asker:
         may_write(file, replace, asker, no_input)
@@ -89,7 +83,7 @@ def camera(
         limits = LensLimits(views=views)
         result = calibrate_lens(found.views, limits, third_radial=third_radial)
         _show(found, result)
-        record = lens_record(result, measurer, shown, limits, serial, notes)
+        record = lens_record(result, installation, shown, limits, serial, notes)
         store_result(file, record, asker, as_json, LENS_COMMENT)
 
 

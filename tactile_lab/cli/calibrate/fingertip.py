@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tactile_lab.cli.calibrate.biotac import Finger
-from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName, writable_file
+from tactile_lab.cli.calibrate.options import Notes, Record, Replace, SimulationSeed, result_file
+from tactile_lab.cli.options import Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -25,22 +26,13 @@ def fingertip(
     source: Annotated[
         Path | None, typer.Option("--from", help="Solve recorded wrenches instead of measuring (any finger).")
     ] = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Also write the measured wrenches to this file.", callback=writable_file)
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="File to write the result to.",
-            show_default="calibrations/INSTALLATION/fingertips.yaml",
-            callback=writable_file,
-        ),
-    ] = None,
+    record: Record = None,
+    out: Annotated[Path | None, result_file("fingertips")] = None,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, speeds, force.")] = None,
     presses: Annotated[int, typer.Option(min=6, max=1000, help="Number of presses on the table.")] = 10,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
-    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
+    seed: SimulationSeed = 0,
+    replace: Replace = False,
+    notes: Notes = "",
     view: View = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",

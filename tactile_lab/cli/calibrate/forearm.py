@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName, writable_file
+from tactile_lab.cli.calibrate.options import Notes, Record, Replace, SimulationSeed, result_file
+from tactile_lab.cli.options import Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -39,20 +40,11 @@ def forearm(
             "manual: enter the pose."
         ),
     ] = ForearmMethod.TOUCH,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="File to write the result to.",
-            show_default="calibrations/INSTALLATION/forearm.yaml",
-            callback=writable_file,
-        ),
-    ] = None,
+    out: Annotated[Path | None, result_file("forearm")] = None,
     source: Annotated[
         Path | None, typer.Option("--from", help="Solve recorded poses instead of measuring (not with manual).")
     ] = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Also write the measured poses to this file.", callback=writable_file)
-    ] = None,
+    record: Record = None,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, least motion, errors, speeds.")] = None,
     geometry: Annotated[Path | None, typer.Option(help="Geometry to press, instead of the rig's.")] = None,
     board: Annotated[Path | None, typer.Option(help="Board on the hand, instead of the rig's.")] = None,
@@ -72,9 +64,9 @@ def forearm(
         float | None, typer.Option(min=0.0, max=180.0, help="manual: standard deviation of the rotation per axis.")
     ] = None,
     valid_days: Annotated[float, typer.Option(min=0.01, max=36_500.0, help="How long the result stays valid.")] = 90.0,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
-    replace: Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")] = False,
-    notes: Annotated[str, typer.Option(help="Notes to store with the result.")] = "",
+    seed: SimulationSeed = 0,
+    replace: Replace = False,
+    notes: Notes = "",
     view: View = False,
     view_port: Port = PORT,
     listen: Listen = "127.0.0.1",

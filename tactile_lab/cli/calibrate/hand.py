@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactile_lab.cli.options import LARGEST_SEED, Json, NoInput, RigName, writable_file
+from tactile_lab.cli.calibrate.options import Notes, Record, Replace, SimulationSeed, result_file
+from tactile_lab.cli.options import Json, NoInput, RigName
 from tactile_lab.cli.running.page_address import PORT, Certificate, Listen, PageAddress, Port, Token, View
 
 if TYPE_CHECKING:
@@ -19,10 +20,6 @@ if TYPE_CHECKING:
     from tactile_lab.rigs.description import Rig
     from tactile_lab.workflow.calibrating_joints import FoundJoints, JointRequest
 
-Source = Annotated[Path, typer.Option("--from", help="Recorded data.")]
-Replace = Annotated[bool, typer.Option("--replace", help="Replace an existing result without asking.")]
-Notes = Annotated[str, typer.Option(help="Notes to store with the result.")]
-
 
 def joints(
     source: Annotated[
@@ -33,18 +30,9 @@ def joints(
     fingers: Annotated[str, typer.Option(help="Fingers that press the block (not the thumb).")] = "FF,MF,RF",
     rounds: Annotated[int, typer.Option(min=1, max=100, help="Number of presses per face and posture.")] = 1,
     settings: Annotated[Path | None, typer.Option(help="Settings file: limits, errors, speeds.")] = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Also write the measured touches or poses to this file.", callback=writable_file)
-    ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Random seed of a simulated rig.")] = 0,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="File to write the result to.",
-            show_default="calibrations/INSTALLATION/joints.yaml",
-            callback=writable_file,
-        ),
-    ] = None,
+    record: Record = None,
+    seed: SimulationSeed = 0,
+    out: Annotated[Path | None, result_file("joints")] = None,
     replace: Replace = False,
     notes: Notes = "",
     view: View = False,
@@ -168,7 +156,11 @@ def _joint_row(joint: str, found: JointCorrection, faults: tuple[str, ...]) -> l
     return [joint, *figures, str(found.poses or ""), "OUTSIDE: " + "; ".join(faults) if faults else "ok"]
 
 
-def electrodes(source: Source, as_json: Json = False, no_input: NoInput = False) -> None:
+def electrodes(
+    source: Annotated[Path, typer.Option("--from", help="Recorded data.")],
+    as_json: Json = False,
+    no_input: NoInput = False,
+) -> None:
     """Find dead, open and noisy electrodes of a BioTac in a table of counts recorded without contact.
 
     One line per sample, one column per electrode. Exit code 0: all OK; 2: the table cannot be used; 3: some are faulty.
