@@ -125,7 +125,7 @@ def wrench_motion(data: FingertipData) -> MotionReport:
 
 
 def _spread(directions: Array, rank: int) -> float:
-    """Mean squared share of the directions along the weakest of so many axes."""
+    """Mean squared share of the directions along the weakest of this many axes."""
     return float(np.linalg.eigvalsh(directions.T @ directions / max(1, len(directions)))[3 - rank])
 
 

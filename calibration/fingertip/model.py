@@ -74,9 +74,9 @@ class Refined:
         com_distal_m, centre_distal_m, semi_axes_m: shape (3,) each.
         covariance: of all of them, shape (13, 13), see :data:`PARTS`.
         variance_factor: squared residuals over what the stated noise allows; about 1 when the noise is as stated.
-        rest: what is left of the untouched readings, shape (n, 6), N and N m.
+        rest: residuals of the untouched readings, shape (n, 6), N and N m.
         forces_distal_N: of the presses, shape (m, 3).
-        rest_lever_m: what is left of the presses' torques, per newton, shape (m, 3).
+        rest_lever_m: residuals of the presses' torques, per newton, shape (m, 3).
     """
 
     sensor_R_distal: Array

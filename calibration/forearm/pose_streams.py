@@ -77,7 +77,7 @@ class PoseStreams:
         mount_T_hand: poses of the hand.
         camera_T_target: poses of the target.
         most_delay_s: farthest that the clocks may be apart.
-        most_poses: of the target's so many are used, evenly: each is left out once to judge the result.
+        most_poses: use at most this many of the target's, evenly spaced: each is left out once to judge the result.
         where: the file, for messages.
     """
 

@@ -147,7 +147,7 @@ def outliers(measurements: Sequence[Measurement], values: gtsam.Values) -> tuple
 
 @lru_cache
 def _threshold(size: int) -> float:
-    """Mahalanobis length that a residual of so many numbers passes once in a hundred times."""
+    """Mahalanobis length that one in a hundred residuals with this many numbers exceeds."""
     return float(np.sqrt(chi2.ppf(1 - _OUTLIER_SHARE, size)))
 
 

@@ -162,7 +162,7 @@ def _problem(item: ErrorDetails, model: type[BaseModel]) -> str:
 
 
 def plain_words(message: str) -> str:
-    """What pydantic says about a value, without its own turns of phrase ("Value error, ...", "Input should ...")."""
+    """What pydantic says about a value, without its own phrases ("Value error, ...", "Input should ...")."""
     own = message.removeprefix("Value error, ").removeprefix("Assertion failed, ")
     return re.sub(_UNPARSED, "", re.sub(r"^[A-Z]\w+ should", "must", own))
 

@@ -6,7 +6,7 @@ TactileLabError                exit 1
  |   `- CodecError                      bytes that do not follow the protocol
  |- SafetyError                exit 1   a limit of the hand or the workspace was exceeded: the rig has stopped
  |- SessionError               exit 1   a session folder or its traffic file
- |   |- SessionDataError   exit 2   a session that was given: missing, damaged, or without what is asked for
+ |   |- SessionDataError   exit 2   a session that was given: missing, damaged, or without the requested data
  |   `- EstimationError                 a program error during estimation or planning
  |- WriteError                 exit 1   a file that cannot be written: a full disk, a folder one may not write to
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
@@ -72,7 +72,7 @@ class SessionError(TactileLabError):
 
 
 class SessionDataError(SessionError):
-    """A session that was given, its recording or its results are missing, damaged, or lack what is asked for."""
+    """A session that was given, its recording or its results are missing, damaged, or lack the requested data."""
 
     exit_code = 2
 

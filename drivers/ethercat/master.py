@@ -32,8 +32,8 @@ class MasterSettings(StrictModel):
         answer_s: a cyclic frame that has not come back after this time counts as lost, seconds.
         setup_answer_s: the same while the ring is set up.
         tries: how often a frame is sent during set-up before the ring counts as silent.
-        state_tries: how often a slave is asked whether it has reached a state, 10 ms apart.
-        eeprom_tries: how often a busy EEPROM is asked again, 10 ms apart.
+        state_tries: how often a slave's state is read while it changes, 10 ms apart.
+        eeprom_tries: how often a busy EEPROM is read again, 10 ms apart.
     """
 
     answer_s: float = Field(default=0.001, gt=0.0, le=0.1)

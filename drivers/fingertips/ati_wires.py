@@ -1,4 +1,4 @@
-"""The ways in which the readings of ATI's sensors arrive: the transport and the decoder of each."""
+"""The wires of ATI's sensors: the transport and the decoder of each."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ _BATCHES = 160  # a flood must not hold the caller
 
 
 class UdpTransport:
-    """Datagrams to and from one device. What comes from any other address is counted and left out.
+    """Datagrams to and from one device. Datagrams from other addresses are counted and ignored.
 
     Args:
         name: the device's name in the rig.
@@ -170,7 +170,7 @@ def _enable(made: socket.socket, option: int) -> bool:
 def wall_offset_ns(clock: Clock) -> int:
     """How far the wall clock, in which the kernel stamps, is ahead of the session's.
 
-    Between two readings the program may be put aside for milliseconds: the pair closest together is taken.
+    Between two readings the scheduler may suspend the program for milliseconds: the pair closest together is taken.
     """
     closest_ns, offset_ns = 1 << 62, 0
     for _ in range(5):

@@ -76,7 +76,7 @@ class GraspAbandonedError(Exception):
 
 
 class DecisionMaker(Protocol):
-    """Asked before each grasp, and hears its outcome. Grasps are numbered from 0."""
+    """Decides before each grasp, and receives its outcome. Grasps are numbered from 0."""
 
     @property
     def centre_m(self) -> Array:

@@ -67,7 +67,7 @@ class Estimate:
         step: the pose, consistent with the surface.
         surface: the shape as plain data for recording and display (topic ``/slam/surface``).
         explored: share of the surface that is known, 0..1; None before there is one.
-        trust: what may be believed of it, as plain data for recording and display: ``status``, and ``doubts`` and
+        trust: how far to trust it, as plain data for recording and display: ``status``, and ``doubts`` and
             ``alternatives`` as sentences; empty where the estimator does not say.
     """
 
@@ -137,7 +137,7 @@ class PlannedGrasp:
 
 
 class GraspPlanner(Protocol):
-    """Chooses every grasp of a session, and hears its outcome. Grasps are numbered from 0."""
+    """Chooses every grasp of a session, and receives its outcome. Grasps are numbered from 0."""
 
     def plan(self, index: int) -> PlannedGrasp:
         """Plan grasp number ``index``."""

@@ -1,4 +1,4 @@
-"""Why a session cannot go on with its object, for people: what was measured, and what to change."""
+"""Why a session cannot continue with its object, in words: what was measured, and what to change."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class ProbingSettings(StrictModel):
         thumb_lane_m: distance of the lanes in which the thumb feels the back.
         margin_m: added on every side: contacts are few, and the corner may lie between lanes.
         tallest_m: over objects higher than this the palm does not pass: their sides are touched with the palm upright.
-        around_m: how far beside its place the object's top is looked for where nothing was met.
+        around_m: how far around its expected place the object's top is searched if nothing was touched.
     """
 
     top: bool = True
@@ -97,7 +97,7 @@ class BoxProber:
         self._sides = SideSurvey(toucher, yaw_window_rad, settings.search_m, lanes_m, margin_m)
 
     def feel(self, stop: Callable[[], bool] = lambda: False) -> BoundingBox:
-        """Top, left, front, right, back; ``stop`` is asked before each whether to leave the rest out.
+        """Top, left, front, right, back; ``stop`` is called before each, and returns whether to skip the rest.
 
         The palm passes over what is low: its sides are raked, if they are wanted. What is taller is touched from its
         sides in any case.

@@ -65,7 +65,7 @@ class CycleSettings(StrictModel):
         clearance_m: how far the hand stays above the tallest thing on the table while it travels.
         standoff_m: how far before a grasp from the side the hand comes down.
         descent_m_s: speed of the guarded descent, as far as the object's top.
-        landing_m_s: and beside it; on a thumb, stiff in that direction, 35 mm/s end with 1.6 N.
+        landing_m_s: and next to the object; on a thumb, stiff in that direction, 35 mm/s end with 1.6 N.
         beside_m_s: the same where nothing is expected below.
         approach_m_s: speed of the guarded approach from the side.
         landing_force_N: a fingertip force during the descent that means the object is under it.

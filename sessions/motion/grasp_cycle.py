@@ -73,8 +73,9 @@ class GraspCycle:
     def descend(self, plan: GraspPlan) -> bool:
         """Move above, tap on the top if the plan says so, tare, and descend guarded.
 
-        A fingertip that touches something on the way down has landed on the object: lift, shift the grasp toward that
-        finger and try again. If thumb and fingers have both landed, the object is too long in that direction: turn.
+        A fingertip that touches something during the descent has landed on the object: lift, shift the grasp toward
+        that finger and try again. If thumb and fingers have both landed, the object is too long in that direction:
+        turn.
 
         Returns:
             Whether the hand has descended around the object, fingers open; after a touch alone, whether there was room
@@ -126,7 +127,7 @@ class GraspCycle:
         self._motion.tare(s.rest_s)
 
     def _above(self) -> Array:
-        """Where the hand may travel, above the grasp or, from the side, above where it comes down beside the object."""
+        """Where the hand may travel, above the grasp or, from the side, above where it descends next to the object."""
         table = self._table()
         above_m = travel_height_m(table, self._motion, self.settings, self._hand)
         return self._motion.base_joints(self.plan.frame, table, above_m, self._away_m)
@@ -137,9 +138,9 @@ class GraspCycle:
         return self.settings.standoff_m if self._table().is_sideways else 0.0
 
     def _come_from_the_side(self) -> bool:
-        """Down beside the object, then toward it with care; back and up again where the hand meets something.
+        """Down next to the object, then slowly toward it; back and up again if the hand hits something.
 
-        What a fingertip has met on the way in is captured as a touch.
+        A contact of a fingertip on the way in is captured as a touch.
         """
         s, motion, table = self.settings, self._motion, self._table()
         if self.plan.tap:
@@ -167,7 +168,7 @@ class GraspCycle:
         return True
 
     def _note_landing(self, guard: Guard) -> None:
-        """Remember where the hand met something: at the fingertip that did, or, not knowing better, at the foremost."""
+        """Store where the hand hit something: at the fingertip that did, or else at the foremost."""
         fingers = [finger for finger in guard.met if finger in self._fingers] or list(self._fingers)
         ahead = np.asarray(self.plan.frame.pose.rotation().rotate(np.array(self._table().approach)))
         places = [self._motion.tip_centre_world_m(finger, self._hand) for finger in fingers]

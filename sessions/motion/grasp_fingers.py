@@ -76,7 +76,7 @@ class GraspFingers:
         self.touching = frozenset(finger for finger in self._fingers if touched[finger] >= s.touch_cycles)
 
     def may_close(self, finger: str, step_m: float) -> bool:
-        """Whether a finger may go on by a step: not beyond its path, nor against the thumb or a neighbour."""
+        """Whether a finger may close by a step without leaving its path or hitting the thumb or a neighbour."""
         path = self.table.path(finger)
         on = self.progress[finger] + step_m / path.length_m
         return self.progress[finger] < path.valid[1] and not (self._meets_thumb(finger) or self._nears(finger, on))
@@ -98,7 +98,7 @@ class GraspFingers:
     def ease(self, touching: frozenset[str]) -> None:
         """Press less and less, all fingers together, while the object is still felt.
 
-        The fingers open at different speeds and leave one after the other: what still presses then pushes the object.
+        The fingers open at different speeds and leave one after the other: the last ones then push the object.
         """
         s = self.settings
         for share in self._motion.shares(s.ease_s):
@@ -152,7 +152,7 @@ class GraspFingers:
     def release(self) -> None:
         """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Overloaded fingers are released first, the others wait for them, or go on where they stand in their way.
+        Overloaded fingers are released first, the others wait for them, unless they are in their way.
         """
         table, closed, opened = self.table, self.progress, _open(self.table)
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))

@@ -69,9 +69,9 @@ class Motion:
         return self.runtime.cycle_ns / NANOSECONDS
 
     def tick(self) -> None:
-        """One cycle, checked by the supervisor; as many more as a hand whose link is gone needs to come back.
+        """One cycle, checked by the supervisor; more cycles while the hand's link is lost, until it recovers.
 
-        So nothing goes on along its path while the hand cannot follow.
+        So no motion continues along its path while the hand cannot follow.
 
         Raises:
             SafetyError: a limit is exceeded.
@@ -105,7 +105,7 @@ class Motion:
             self.tick()
 
     def tare(self, rest_s: float, fingers: Sequence[str] | None = None, tries: int = _TARES) -> Mapping[str, str]:
-        """Rest, and tare the fingertips; retry if one refuses because the hand still moves.
+        """Rest, and tare the fingertips; retry if a fingertip refuses because the hand still moves.
 
         The reading of a fingertip that keeps refusing is subtracted from now on: see :meth:`loads_N`. All are meant
         where ``fingers`` is not given.
@@ -138,7 +138,7 @@ class Motion:
 
         Args:
             duration_s: at full speed.
-            is_careful: its speed was chosen for a first touch: the first approach makes it no slower.
+            is_careful: its speed was chosen for a first touch, so that the first approach does not slow it down.
         """
         supervisor = self.supervisor
         count = self.cycles(duration_s / (supervisor.careful_scale if is_careful else supervisor.speed_scale))
@@ -152,7 +152,7 @@ class Motion:
 
         Args:
             grasp: the grasp frame.
-            closing: how the hand stands there.
+            closing: the hand's posture.
             above_m: so far above it.
             away_m: so far back along the closing's approach.
 

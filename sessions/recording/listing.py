@@ -160,7 +160,7 @@ def session_folder(root: Path, name: str) -> Path:
 
 
 def _refuse_hidden(last: SessionSummary, unreadable: list[SessionSummary]) -> None:
-    """An older session is not taken for the last one where a later one, by its name, cannot be read. Raises
+    """An older session must not count as the last one if a later one, by its name, cannot be read. Raises
     ConfigurationError.
     """
     for item in unreadable:

@@ -5,7 +5,7 @@
     20261121-093000-sim-box/
         session.yaml        written first (status open), closed last
         calibration/        copies of the calibration files used
-        traffic.mcap        bytes, session events, samples, truth; a long one goes on in traffic-2.mcap
+        traffic.mcap        bytes, session events, samples, truth; a long one continues in traffic-2.mcap
         truth/object.ply    the object's true mesh, for evaluation only
         results/            results computed from it
 """

@@ -26,7 +26,7 @@ _REPEATS, _MESH_m = 5, 0.007
 
 
 def decision_table(contacts: int = CONTACTS, policies: tuple[str, ...] = tuple(POLICIES)) -> TimingTable:
-    """Median time of one decision of each policy. Surfaces are sampled anew each time; loops are compiled
+    """Median time of one decision of each policy. Surfaces are sampled again each time; loops are compiled
     beforehand.
     """
     belief, candidates = box_belief(contacts), box_candidates()

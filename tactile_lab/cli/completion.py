@@ -1,6 +1,6 @@
 """What a shell offers behind options and arguments: rigs, objects, policies, shape models, experiments, sessions.
 
-Nothing is loaded before a name is asked for, and a name is never the reason for an error: whatever cannot be listed is
+Nothing is loaded before a name is completed, and no name causes an error: what cannot be listed is
 not offered. File names are the shell's own affair.
 """
 

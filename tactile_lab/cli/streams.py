@@ -1,6 +1,7 @@
 """Standard output and standard error that may go away while the program runs: a closed pipe, a terminal that is gone.
 
-Nobody reads on then, but a session goes on and is recorded. What could not be written is remembered, for the exit code.
+Nobody reads any more, but the session continues and is recorded. What could not be written is remembered, for the exit
+code.
 """
 
 from __future__ import annotations

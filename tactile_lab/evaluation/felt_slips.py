@@ -1,4 +1,4 @@
-"""What odometry in the hand missed, by the marker camera, in units of what it said of its own error."""
+"""The error of in-hand odometry, by the marker camera, relative to its stated standard deviations."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class FeltSlips:
         return np.asarray(self.missed / self.sigmas[:, [0, 0, 1]])
 
     def share_within(self, sigmas: float) -> tuple[float, float]:
-        """Share of translations and of rotations within so many standard deviations."""
+        """Share of translations and of rotations within this many standard deviations."""
         within = np.abs(self.in_sigma) < sigmas
         return float(within[:, :2].mean()), float(within[:, 2].mean())
 
@@ -66,7 +66,7 @@ class FeltSlips:
         return float(np.sqrt(np.mean(np.minimum(np.abs(self.in_sigma), _FAR) ** 2)))
 
     def in_words(self) -> str:
-        """How often the stated error was kept, and what to change."""
+        """How often the error was within the stated one, and what to change."""
         shares = [self.share_within(sigmas) for sigmas in (1, 2, 3)]
         lengths, turns = (" / ".join(f"{100 * share[part]:.0f}" for share in shares) for part in (0, 1))
         told = f"felt within 1 / 2 / 3 of its own standard deviations: {lengths} % (mm), {turns} % (°)"

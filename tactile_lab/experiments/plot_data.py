@@ -140,7 +140,7 @@ class SurfacePanel:
         facets: from the back to the front.
         edges: of the true surface, as x and y of both ends in the picture, millimetres.
         dots: x and y in the picture, millimetres.
-        names: a text, and where it stands in the picture: x and y in millimetres.
+        names: a text, and its place in the picture: x and y in millimetres.
     """
 
     title: str

@@ -41,10 +41,10 @@ class CalibrationFiles(StrictModel):
         joints: joint sensor tables of this hand (Shadow's calibration.yaml).
         motors: which motor pulls which joint.
         boards: settings of the motor boards; on wires they are uploaded at every start, and kept when left out.
-        rates: how often motors are asked for what, in place of ``hand.polling``; for hands on wires.
+        rates: how often each type is requested from the motors, in place of ``hand.polling``; for hands on wires.
         gains: position control of this hand (``sr_edc_joint_position_controllers_PWM.yaml``); for hands on wires.
         fingertips: shape, mounting and weight of the fingertips.
-        forearm: where the positioner stands in the world.
+        forearm: the positioner's pose in the world.
         normals: learned contact normals of BioTacs; the skin's at equation 2.24's point without.
         camera, markers: lens, and the markers of the rig; left out for a rig without a camera.
         geometry: what fingertips press to calibrate: edges of the table, a block, marked points.

@@ -23,7 +23,8 @@ class HandFiles(StrictModel):
         joints: joint sensor tables (``calibration.yaml``).
         motors: which motor pulls which joint; a wrong one can damage the hand.
         boards: settings of the motor boards (``motor_board_effort_controllers.yaml``); they keep theirs when left out.
-        rates: how often motors are asked for what (``motor_data_polling.yaml``); in place of ``hand.polling``.
+        rates: how often each type is requested from the motors (``motor_data_polling.yaml``); in place of
+            ``hand.polling``.
         gains: position control (``sr_edc_joint_position_controllers_PWM.yaml``); in place of ``hand.gains``.
     """
 

@@ -59,7 +59,7 @@ class SlamResult:
         surface: the final field in the object frame, None if there was no usable grasp.
         contour: the final outline (dimension 2), object frame.
         mesh: the final surface (dimension 3), object frame.
-        status: how much of it may be believed, see :mod:`tactile_lab.slam.doubt.status`.
+        status: how far to trust it, see :mod:`tactile_lab.slam.doubt.status`.
         warnings: failures that did not end the estimation.
         known_share: share of the outline or surface that was touched, 0 to 1; None without a shape.
         doubts: reasons to doubt the result.

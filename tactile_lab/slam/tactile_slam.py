@@ -86,7 +86,7 @@ class SlamSettings(TrackingSettings):
 
 
 class TactileSlam:
-    """The method, grasp by grasp. The same settings, seed and grasps give the same result."""
+    """Estimates grasp by grasp. The same settings, seed and grasps give the same result."""
 
     def __init__(
         self,
@@ -241,7 +241,7 @@ class TactileSlam:
 
     @on_one_thread
     def assess(self, shape: Contour | SurfaceMesh | None) -> Assessment:
-        """What may be believed of the present estimate, between grasps.
+        """How far to trust the present estimate, between grasps.
 
         Args:
             shape: the present outline or surface, object frame; None if there is none.

@@ -115,7 +115,7 @@ def status_html(scene: Scene) -> str:
 
 
 def trust_html(scene: Scene) -> str:
-    """What may be believed of the estimate: its status, and each doubt and alternative on a line; empty if unknown."""
+    """How far to trust the estimate: its status, and each doubt and alternative on a line; empty if unknown."""
     told = scene.trust
     if not told:
         return ""

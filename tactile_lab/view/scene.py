@@ -104,7 +104,7 @@ class Scene:
 
     @property
     def trust(self) -> dict[str, Any]:
-        """What may be believed of the newest estimate, as its message says; empty where it does not."""
+        """How far to trust the newest estimate, from its message; empty if it does not say."""
         newest = self.steps[max(self.steps)] if self.steps else {}
         return newest if "status" in newest else {}
 

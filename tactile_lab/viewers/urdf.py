@@ -1,4 +1,4 @@
-"""The robot's description as URDF, of primitive shapes only: no file beside it is needed.
+"""The robot's description as URDF, of primitive shapes only: it needs no other file.
 
 URDF knows boxes, cylinders and spheres. A capsule becomes a cylinder and two spheres; an ellipsoid becomes the capsule
 along its longest axis with the same length and the mean of the other two semi-axes.

@@ -26,7 +26,7 @@ class Attendance:
     """Who is there.
 
     Attributes:
-        operator: a person, or what stands in for one; None for nobody.
+        operator: a person or a simulated one; None for nobody.
         guides: the operator decides; else the planner does, and the operator may pause, undo and end.
         led_by: how the hand is moved in a guided session; None for what the rig says.
         automatic: captures come by themselves; None for what the rig says.

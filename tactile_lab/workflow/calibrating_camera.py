@@ -59,8 +59,8 @@ def gather_views(
     """Views of the board: all of a folder or video, of a camera until nothing is missing.
 
     Args:
-        most: end with so many views.
-        least: a camera is not stopped before so many, whatever they cover.
+        most: end with this many views.
+        least: a camera is not stopped before this many, even with full coverage.
         told: called after each picture that was used or refused, for guidance.
         goes_on: asked before each picture; False ends with the views there are.
 

@@ -1,4 +1,4 @@
-"""Ways to write a whole session, by name: ours, and those of extensions and plug-ins."""
+"""Exporters of whole sessions, by name: ours, and those of extensions and plug-ins."""
 
 from __future__ import annotations
 

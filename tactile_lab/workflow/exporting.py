@@ -47,7 +47,7 @@ class ExportedContacts:
 def export_contacts(session: Session, path: Path, dimension: int | None = None) -> ExportedContacts:
     """Write the grasps of a recorded session, understood from its raw bytes, as a contact log.
 
-    The true mesh, where the session has one, is written beside it as a PLY file of the same name.
+    The true mesh, where the session has one, is written next to it as a PLY file of the same name.
 
     Args:
         session: the recording.
@@ -92,7 +92,7 @@ def _motion_sigma(noise: MotionNoise) -> MotionSigma:
 
 
 def _truth(session: Session, path: Path) -> ObjectTruth:
-    """The object's name, and a copy of its mesh beside the log."""
+    """The object's name, and a copy of its mesh next to the log."""
     name = session.manifest.object_name
     if session.truth_mesh is None:
         return ObjectTruth(name=name)

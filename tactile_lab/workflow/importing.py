@@ -23,7 +23,7 @@ def import_session(archive: Path, root: Path, name: str | None = None) -> Sessio
 
 
 def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path | None = None) -> ContactLog:
-    """Timed contacts as a contact log, with the true mesh, where there is one, copied beside it.
+    """Timed contacts as a contact log, with the true mesh, where there is one, copied next to it.
 
     Raises:
         ConfigurationError: a file cannot be read, the contacts do not fit the form or do not make sense, the mesh

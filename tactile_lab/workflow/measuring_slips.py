@@ -15,7 +15,7 @@ from tactile_lab.workflow.replaying import true_poses
 
 
 def session_slips(session: Session) -> Slips:
-    """Slips between the grasps of a session, by its camera: beside the palm's motion, and beside what was felt.
+    """Slips between the grasps of a session, by its camera: relative to the palm's motion, and to the odometry.
 
     Raises:
         SessionError, ConfigurationError: the recording, or the calibration in it, cannot be used.

@@ -79,7 +79,7 @@ def reconstruct(
         source: a log's file, a session's folder, or a session's name.
         root: where sessions are looked for by name.
         wishes: how to estimate.
-        out: folder of the results, those of an earlier estimation in it are replaced; None for one beside the data
+        out: folder of the results, those of an earlier estimation in it are replaced; None for one next to the data
             that is named after the method, and the shape model if one was chosen.
         progress: receives the number of the grasp that is being estimated.
 

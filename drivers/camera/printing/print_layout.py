@@ -85,7 +85,7 @@ class _Piece:
 
 
 def sheet_of(prints: Sequence[AnyBoard], paper: str = "A4", places: Sequence[str] = ()) -> Sheet:
-    """A sheet with the prints below or beside each other, their names, and a check bar.
+    """A sheet with the prints below or next to each other, their names, and a check bar.
 
     Args:
         prints: what to print.

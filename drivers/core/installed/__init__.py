@@ -1,1 +1,1 @@
-"""What is installed beside the program: packages of extras, and plug-ins."""
+"""What is installed in addition to the program: packages of extras, and plug-ins."""

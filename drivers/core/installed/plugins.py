@@ -5,7 +5,7 @@ A package names them in its ``pyproject.toml``, one table for each kind, and the
     [project.entry-points."tactile_lab.policies"]
     quickest = "my_laboratory.quickest:Quickest"
 
-Nothing of a plug-in is imported before its name is asked for. One that cannot be used is refused by name and file, and
+A plug-in is imported only when its name is used. One that cannot be used is refused by name and file, and
 changes nothing for the others. docs/plugins.md says what each kind is.
 """
 
@@ -38,7 +38,7 @@ class Plugin:
         name: of the entry, in rig files and on the command line.
         package, version: of the distribution that offers it.
         target: module and object, as in the package's metadata.
-        obstacle: why it cannot be used, as a clause; empty if nothing is known against it.
+        obstacle: why it cannot be used, as a clause; empty if there is none.
     """
 
     group: str

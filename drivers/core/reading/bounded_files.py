@@ -40,7 +40,7 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
 
 
 def refuse_unreachable(path: Path) -> None:
-    """Before anything is asked about a path: whether there is something can be found out, and need not be so.
+    """Call it before any other query of a path: raises if its existence cannot be determined.
 
     Raises:
         ConfigurationError: a folder on the way may not be entered, the name is too long, or a link leads to itself.

@@ -92,7 +92,7 @@ class UrHost:
         self.close()
 
     def turn(self) -> None:
-        """Serve what has come within a few milliseconds. A box whose cable is pulled hears and says nothing."""
+        """Serve what has come within a few milliseconds. A box whose cable is unplugged receives and sends nothing."""
         if self._box.plugged:
             for key, _ in self._selector.select(_TURN_s):
                 if isinstance(key.data, Connection):

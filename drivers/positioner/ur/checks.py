@@ -111,7 +111,7 @@ def outside(q: Array, settings: UrSettings) -> Refusal | None:
 
 
 def is_reachable(q: Array, settings: UrSettings) -> bool:
-    """Whether a place, shape (6,), lies within reach and beside the arm's first axis."""
+    """Whether a place, shape (6,), is within reach and not too close to the arm's first axis."""
     least_m, most_m = settings.reach_m
     return bool(np.hypot(q[0], q[1]) >= least_m and np.linalg.norm(q[:3]) <= most_m)
 
@@ -126,7 +126,7 @@ def wrong_payload(arm: ArmState, settings: UrSettings) -> Refusal | None:
 
 
 def stop_cause(arm: ArmState, settings: UrSettings) -> Refusal | None:
-    """Why a session with this arm cannot go on; None while it can."""
+    """Why a session with this arm must stop; None if it can continue."""
     if not arm.flags & ArmFlags.HEARD:
         return UNHEARD
     if refusal := not_ready(arm, settings):

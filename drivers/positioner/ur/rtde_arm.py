@@ -83,7 +83,7 @@ class RtdeArm:
         return f"{found}, payload {self._settings.payload_kg} kg"
 
     def _listen(self) -> None:
-        """Hear the arm from now on: on a new connection comes nothing that was said before."""
+        """Receive from now on: a new connection brings nothing old."""
         if self._news is not None:
             self._news.disconnect()
         self._news = self._called("rtde_receive", "RTDEReceiveInterface", self._rate_hz, _OUTPUTS)
@@ -202,11 +202,11 @@ class RtdeArm:
         )
 
     def _is_silent(self, patience_ns: int) -> bool:
-        """Whether nothing is sent to the arm: the package would wait for its answer, and hear no command meanwhile."""
+        """Whether to send nothing: the package would wait for the arm's answer, and accept no command meanwhile."""
         return self._clock.now_ns() - self._heard_ns > patience_ns
 
     def stand(self) -> None:
-        """Stop streaming; the arm brakes and stands, but hears that this program is alive."""
+        """Stop streaming; the arm brakes and stands, but knows that this program is alive."""
         if self._is_silent(round(self._settings.unheard_s * NANOSECONDS)):
             return
         if self._servoing:

@@ -13,7 +13,7 @@ Vector = tuple[float, float, float]
 
 
 class UrSettings(PositionerSettings):
-    """Limits of the arm, beside those of every positioner. The mount's frame is the arm's base frame.
+    """Limits of the arm, in addition to those of every positioner. The mount's frame is the arm's base frame.
 
     Attributes:
         payload_kg: mass of everything on the flange: hand, forearm, adapter and cables. It has to be stated.

@@ -140,7 +140,7 @@ class UrWorker:
 
 
 def stream(worker: UrWorker, orders: OrderReader, clock: Clock, cycle_s: float) -> None:
-    """Obey orders as they come, and step the stream at its period, until the orders end."""
+    """Execute orders as they arrive, and step the stream at its period, until the orders end."""
     due_ns = clock.now_ns()
     while True:
         due_ns = max(due_ns + round(cycle_s * NANOSECONDS), clock.now_ns())

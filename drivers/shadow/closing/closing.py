@@ -229,7 +229,7 @@ def side_with_first_finger_down(form: HandForm) -> str:
 
 
 def mirrored_closing(name: str) -> str:
-    """The closing of the other hand whose mirror image has that name: what comes from the left comes from the right."""
+    """The closing of the other hand whose mirror image has that name; left and right are exchanged."""
     upright, found, side = name.rpartition("-from-")
     return sideways(upright, SIDES[1 - SIDES.index(side)]) if found else name
 

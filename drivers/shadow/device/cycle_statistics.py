@@ -41,7 +41,7 @@ class CycleStatistics:
         self.cycles = self._left_out = self._worst_ns = 0
 
     def add(self, lateness_ns: int, left_out: int = 0) -> None:
-        """A cycle started so late; so many before it were left out."""
+        """Count a cycle by its delay, and the cycles skipped before it."""
         self._counts[min(max(lateness_ns, 0) // _BIN_ns, _BINS - 1)] += 1
         self.cycles += 1
         self._left_out += left_out

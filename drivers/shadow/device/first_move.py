@@ -105,7 +105,7 @@ def check_motor_map(
 
 
 def require_motor_map(findings: Sequence[MoveFinding], where: str) -> None:
-    """Refuse to go on with a map that is wrong.
+    """Refuse to continue with a wrong map.
 
     Raises:
         DeviceError: the first finding that is not as it should be, in words.

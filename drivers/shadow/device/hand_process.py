@@ -19,7 +19,7 @@ from drivers.shadow.device.first_move import MoveFinding, require_motor_map
 from drivers.shadow.device.hand_setup import HandSetup
 
 PATIENCE_s = 1.0
-"""So long the hand's process goes on without any order before it takes the demands away."""
+"""Without any order for this time, the hand's process sets its demands to zero."""
 
 _START_s, _REPORT_s, _MOVES_s, _END_s = 30.0, 5.0, 120.0, 10.0
 

@@ -32,11 +32,11 @@ class HandSettings(StrictModel):
             cable it is :data:`WIRE_CYCLE_s` where it is left out (:attr:`on_wire`).
         demand: what is commanded to the motors: a duty cycle, or a torque that they keep by themselves at 5 kHz.
         gains: position control, in counts of that demand.
-        polling: how often the motors are asked for what.
+        polling: how often each type is requested from the motors.
         tactile: kind of fingertip asked for data through the palm.
         tactile_names: ask the fingertips, after connecting, who they are as well; ``rig check`` does.
-        link_patience_s: without a valid status for so long the hand stops; what comes back sooner goes on by itself.
-        blind_after: so many lost cycles in a row already take the demands away, until a status comes again.
+        link_patience_s: the hand stops after this time without a valid status; before that it recovers by itself.
+        blind_after: after this many lost cycles in a row demands are zero until the next status.
         soft_start_s: after connecting, a resume or a loss the duty cycle limit rises from zero in this time.
         demand_grace_s: after a pause in the demands motors may report for so long that they had halted.
         heat: temperature limits of the motors.

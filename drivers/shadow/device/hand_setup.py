@@ -36,7 +36,7 @@ class HandSetup(StrictModel):
         hand: how it is driven; ``cycle_s`` is the period of its cycle.
         joints, motors: calibration files of this very hand.
         boards: settings to upload to the motor boards when connecting; they keep theirs when left out.
-        rates: how often motors are asked for what, in place of ``hand.polling``.
+        rates: how often each type is requested from the motors, in place of ``hand.polling``.
         gains: position control as Shadow delivers it (``sr_edc_joint_position_controllers_PWM.yaml``), in place of
             ``hand.gains``; its signs state which motors turn backwards.
     """
@@ -96,7 +96,7 @@ class HandSetup(StrictModel):
         return (EthercatTransport if self.master == "own" else PysoemTransport)(self.name, settings, clock)
 
     def check_files(self) -> None:
-        """Read every file that is named, and compare them with what stands beside them. Raises ConfigurationError."""
+        """Read every file that is named, and compare them with the files next to them. Raises ConfigurationError."""
         check_map(self.motors, self.infos())
         self.wiring()
         self.settings()

@@ -1,7 +1,7 @@
 """Is what the joint sensors say believable? Looked at in every cycle, before a demand goes out that rests on it.
 
-A sensor whose wire is broken reads 0 or 4095, or anything; one whose converter hangs stands still. Control would drive
-the joint at its full demand on such a word.
+A sensor whose wire is broken reads 0 or 4095, or anything; one whose converter hangs does not change. Control would
+drive the joint at its full demand on such a word.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ class SensorLimits(StrictModel):
         margin: how far beyond its calibrated counts a joint may read, as a share of their span.
         rate_rad_s: quicker than this no joint turns, even when it is let go.
         jump_rad: a step of this size between two readings is noise.
-        frozen_s: a driven joint that reads the very same for so long stands still, or its sensor does. At its largest
-            demand a finger turns by 10 to 15 degrees in the default time.
+        frozen_s: a driven joint with an identical reading for this time is blocked, or its sensor is frozen. At its
+            largest demand a finger turns by 10 to 15 degrees in the default time.
         frozen_share: driven with this share of its largest demand at least.
         idle_torque_counts: with a smaller strain-gauge difference the motor pushes against nothing, so that a driven
             joint has to move.

@@ -33,7 +33,7 @@ class LoadLimits(StrictModel):
     Attributes:
         torque_counts: largest strain-gauge difference of a motor, counts; gauges of 12 bits cannot exceed 4095.
         exceptions: the same for single driven joints. The wrist's motors are twenty times as strong as a finger's.
-        readings: so many readings in a row over a limit stop the hand; a single one may be a jerk.
+        readings: the hand stops after this many readings in a row over a limit; a single one may be a jerk.
         stall_s: pushing for so long with the largest duty cycle stops the hand, unless the joint turns meanwhile.
         stall_rad: a joint that has turned so far does turn.
     """

@@ -1,9 +1,9 @@
-"""What the motors are asked cycle by cycle, and what is known of them from their answers.
+"""Requests to the motors cycle by cycle, and the state known from their answers.
 
-The palm hears half of the motors in a cycle, the even or the odd ones, and the requested data type changes on the step
+The palm reads half of the motors in a cycle, the even or the odd ones, and the requested data type changes on the step
 to the odd ones: (even, T1), (odd, T2), (even, T2), (odd, T3) and so on, as Shadow's host does (protocols: Motor
 polling). Types that change slowly take a turn of two cycles when their period is over, so that both halves answer
-them; types that never change are asked in every second turn after connecting, until all are known.
+them; types that never change are requested in every second turn after connecting, until all are known.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _KINDS: dict[str, FromMotor] = {
 
 
 class PollingRates(StrictModel):
-    """How often the motors are asked for each type, in the words of Shadow's ``motor_data_polling.yaml``.
+    """How often each type is requested from the motors, in the words of Shadow's ``motor_data_polling.yaml``.
 
     Each is -1 for every turn, -2 for after connecting only, a period in seconds, or left out for never. Flags have to
     be asked in every turn or at least once a second, as the hand's safety rests on them, and temperatures at least
@@ -89,7 +89,7 @@ class PollingRates(StrictModel):
 
     @property
     def periods_s(self) -> dict[FromMotor, float]:
-        """Types that are asked at intervals, seconds."""
+        """Intervals of the types that are requested periodically, seconds."""
         rates = ((kind, getattr(self, name)) for name, kind in _KINDS.items())
         return {kind: rate for kind, rate in rates if rate is not None and rate > 0.0}
 
@@ -111,7 +111,7 @@ def load_rates(path: Path) -> PollingRates:
 
 
 class MotorPolling:
-    """Which motors are asked for which type in each cycle.
+    """Which type is requested from which motors in each cycle.
 
     Args:
         rates: how often for each type.

@@ -43,7 +43,7 @@ class EthercatSettings(StrictModel):
         side: the side that must be there, as far as the palm's product code states it; any when left out.
         watchdog_s: palm leaves OP when no command came for so long; when left out it relies on its motors, which halt
             by themselves after 20 ms, as Shadow's own driver does.
-        poll_every: the slaves' states are looked at every so many cycles.
+        poll_every: the slaves' states are read once in this many cycles.
         master: patience with frames.
     """
 

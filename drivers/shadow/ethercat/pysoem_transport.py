@@ -50,7 +50,7 @@ class PysoemTransport:
         clock: the session's.
 
     Raises:
-        ConfigurationError: pysoem is not installed, or the watchdog is asked for.
+        ConfigurationError: pysoem is not installed, or a watchdog is requested.
     """
 
     def __init__(self, name: str, settings: EthercatSettings, clock: Clock) -> None:

@@ -1,8 +1,8 @@
 """Which hand it is, from all sources: its own configuration folder, its motor map, and the rig file.
 
 Shadow's folder for a serial number holds ``general_info.yaml`` above the calibration (protocols: Joint calibration
-files). A left hand that is taken for a right one has all its contacts mirrored, and a hand with fewer fingers would be
-asked for joints that it does not have. So all statements are compared before anything moves.
+files). A left hand that is mistaken for a right one has all its contacts mirrored, and a hand with fewer fingers would
+be asked for joints that it does not have. So all statements are compared before anything moves.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class HandStatement:
 
 
 def load_infos(files: Iterable[Path]) -> dict[Path, HandInfo]:
-    """What stands beside or above the files of a hand, by its path; nothing where there is no such file.
+    """The information files next to or above the files of a hand, by path; empty if there are none.
 
     Raises:
         ConfigurationError: such a file cannot be used.

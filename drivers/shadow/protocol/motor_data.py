@@ -71,7 +71,7 @@ CONFIG_TYPES: tuple[ToMotor, ...] = tuple(ToMotor(code) for code in range(ToMoto
 
 
 class SlowData(IntEnum):
-    """Types of :attr:`FromMotor.SLOW_MISC`: the type stands in ``torque``, its value in ``misc``."""
+    """Types of :attr:`FromMotor.SLOW_MISC`: the type is in ``torque``, its value in ``misc``."""
 
     INVALID = 0
     SVN_REVISION = 1

@@ -30,7 +30,7 @@ OPTIONAL_CHANNELS = range(26, 32)
 
 
 class EdcCommand(IntEnum):
-    """What the palm is asked for, and in a status what it did."""
+    """Requests to the palm, and in a status what it did."""
 
     INVALID = 0  # in a status: the palm did not write in time
     SENSOR_DATA = 1

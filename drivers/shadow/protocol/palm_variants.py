@@ -2,7 +2,7 @@
 
 Layouts follow Shadow's headers (protocols: Palm images; Palm 0250); each ends with the CAN bridge's 12 bytes. The
 0240's status is that of the 0220, the 0250's command that of the 0240. What a magnetic fingertip's 78 bytes mean is not
-known: they are kept as they come.
+known: they are kept unchanged.
 """
 
 from __future__ import annotations

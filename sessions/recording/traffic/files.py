@@ -17,7 +17,7 @@ SEAL = "crc32"
 
 
 def sealed(info: Mapping[str, str]) -> dict[str, str]:
-    """What a writer notes, with a checksum of it: it stands in the file twice, and one of them may be damaged."""
+    """What a writer notes, with a checksum of it: it is in the file twice, and one copy may be damaged."""
     return {**info, SEAL: _checksum(info)}
 
 

@@ -13,7 +13,7 @@ class Loss:
         truncated: the file ends too early; up to the last tenth of a second was not written.
         unreadable_bytes: bytes after the last complete record.
         damaged_chunks: chunks skipped.
-        damaged_records: places where no record begins though one should; reading goes on at the next one.
+        damaged_records: places without a record where one should begin; reading continues at the next one.
         missing_messages: gaps in the numbering of what was read.
         by_topic: messages missing by topic: in a whole file by its summary, else those of damaged chunks whose index
             could be read; part of ``missing_messages``.

@@ -56,7 +56,7 @@ def _message(data: bytes, start: int, end: int) -> Message:
 
 
 def _check_size(chunk: Chunk) -> None:
-    """No recorder makes a chunk larger than this, and unpacking one takes no more. Raises ValueError."""
+    """No recorder writes larger chunks, and unpacking one needs no more memory. Raises ValueError."""
     packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else len(chunk.data)
     if chunk.compression not in ("", "zstd") or max(chunk.uncompressed_size, packed) > LARGEST_CHUNK_bytes:
         raise ValueError(f"a chunk of {max(chunk.uncompressed_size, packed)} bytes, packed by {chunk.compression!r}")

@@ -1,8 +1,8 @@
 """The records of an MCAP file one after another: whole, torn, or with damage in it.
 
 A record's length says where the next one begins, so that one wrong bit in it would hide all that follows. Chunks and
-message indices tell their length twice, the summary says where every chunk stands, and without a summary chunks are
-found by how they begin: after damage reading goes on at the next record.
+message indices state their length twice, the summary lists the place of every chunk, and without a summary chunks are
+found by how they begin: after damage reading continues at the next record.
 """
 
 from __future__ import annotations
@@ -158,7 +158,7 @@ class Frames:
         return opcode in _OPCODES and length <= self._size - offset
 
     def _resume(self, start: int) -> int | None:
-        """Where reading goes on after damage at or behind an offset; None at the end of the file."""
+        """Where reading continues after damage at or behind an offset; None at the end of the file."""
         place = bisect_right(self._landmarks, start - 1)
         landmark = self._landmarks[place] if place < len(self._landmarks) else None
         found = self._search(start, self._size if landmark is None else landmark)

@@ -65,7 +65,7 @@ class Tail(NullTail):
     """The ring of one recording.
 
     Args:
-        recording: its first file; the link is made beside it.
+        recording: its first file; the link is created next to it.
         size: of the ring, bytes.
 
     Raises:

@@ -55,7 +55,7 @@ def sweep(
 ) -> None:
     """Run a simulated session for every object, seed and dimension, and tabulate errors and failures.
 
-    A sweep that was interrupted, or whose worker was killed, goes on behind its finished runs when it is started again.
+    Started again, a sweep that was interrupted, or whose worker was killed, resumes after its finished runs.
     """
     from tactile_lab.cli.running.sweep_cells import cell_of, row_of
     from tactile_lab.evaluation.sweep import planned_runs, summaries

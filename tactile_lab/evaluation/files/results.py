@@ -33,7 +33,7 @@ class Results:
 
     @property
     def status(self) -> str:
-        """How much may be believed, see :mod:`tactile_lab.slam.doubt.status`; what older files call "ok" is "complete",
+        """How far to trust them, see :mod:`tactile_lab.slam.doubt.status`; what older files call "ok" is "complete",
         without a known share.
         """
         status = str(self.slam["status"])

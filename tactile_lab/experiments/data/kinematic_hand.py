@@ -54,7 +54,7 @@ class Attempt:
     Attributes:
         plan: the grasp as it was executed; landings shift it.
         landings_world_m: points where fingertips landed on the object, (3,) each.
-        grasp: the contacts; None if the hand found no way down.
+        grasp: the contacts; None if every approach was blocked.
     """
 
     plan: GraspPlan

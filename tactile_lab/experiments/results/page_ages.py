@@ -1,7 +1,7 @@
 """Whether the tables of a page are older than the code: asked on the page, answered where the page is read.
 
-A page cannot know what is changed after it was written. The documentation's site is made anew from the code, so that it
-has the answer; it runs this file alone, without the packages.
+A page cannot know what is changed after it was written. The documentation's site is generated from the code, so that
+it has the answer; it runs this file alone, without the packages.
 """
 
 from __future__ import annotations

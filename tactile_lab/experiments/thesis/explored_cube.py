@@ -44,7 +44,7 @@ Measure = Callable[[Gpis, Surface], Array]
 
 
 def explore(seed: int, grasps: int, policy: str) -> FixedSolid:
-    """So many grasps of the cube, the first by chance, the others by a policy."""
+    """Grasp the cube this many times: the first grasp is random, a policy chooses the others."""
     rng = np.random.default_rng([seed, 44])
     cube, chooser = FixedSolid(solid(OBJECT), rng), make_policy(policy)
     candidates = cube.candidates()

@@ -16,7 +16,7 @@ _PLAIN = "plain values of unknown age"
 
 
 def check_calibrations(files: Mapping[str, Path], here: Installation) -> list[Finding]:
-    """One finding for each file of a rig that bears sessions: its age, and what would keep a session from using it.
+    """One finding for each calibration file of a rig: its age, and reasons why a session would refuse it.
 
     Args:
         files: role to file.

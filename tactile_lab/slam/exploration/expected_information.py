@@ -61,7 +61,7 @@ class InformationSettings(StrictModel):
         pose_weight: of the pose's information against the shape's; 1 is the chain rule, 0 asks for the shape alone.
         least_gain: stop when no grasp is expected to gain this many nats; 0: never.
         known_sigma_m: stop when the surface is explored to ``enough`` and known so well everywhere; None never does.
-        enough: share of the surface near contacts at which that question is asked.
+        enough: share of the surface near contacts from which on that counts.
         push_worth, push_worth_in_space: share that counts of what a grasp promises which is expected to push the
             object: it often fits nowhere, and spoils what was known of the pose. In the plane even that is a guess.
     """

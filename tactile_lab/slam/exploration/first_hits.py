@@ -65,7 +65,7 @@ def bounding_spheres(vertices: Any, faces: Any) -> Any:
 
 @compile_when_called
 def spheres_of_blocks(spheres: Any) -> Any:
-    """Spheres around so many successive ones each, shape (b, 4)."""
+    """Spheres around this many successive ones each, shape (b, 4)."""
     blocks = np.zeros(((spheres.shape[0] + _BLOCK - 1) // _BLOCK, 4))
     for b in range(blocks.shape[0]):
         own = spheres[b * _BLOCK : (b + 1) * _BLOCK]

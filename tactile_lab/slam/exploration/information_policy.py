@@ -52,7 +52,7 @@ class InformationPolicy:
         """The largest expected information per second over the next few grasps, 1/s; 0 if nothing can be predicted.
 
         Information about the pose is lost and regained once; sides that only these candidates reach can be used by
-        several grasps, as long as they have more to tell.
+        several grasps, as long as each adds information.
 
         Args:
             candidates, belief, rng: as for a choice.

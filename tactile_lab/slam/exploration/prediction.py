@@ -155,7 +155,7 @@ def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: Po
 
 
 def _pad(rays: ClosingRays, fingers: int) -> tuple[Array, Array, Array]:
-    """Starts, directions and lengths for so many fingers; missing fingers have paths of length zero."""
+    """Starts, directions and lengths for this many fingers; missing fingers have paths of length zero."""
     absent = fingers - len(rays.fingers)
     if absent == 0:
         return rays.starts_m, rays.directions, rays.lengths_m

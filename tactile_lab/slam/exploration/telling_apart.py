@@ -1,4 +1,4 @@
-"""What a grasp is expected to tell about which of several trajectories is right.
+"""The expected information of a grasp about which of several trajectories is right.
 
 An estimate may have alternatives: other placings of some grasps, and so another shape or another present pose. A grasp
 that fingers would end differently under an alternative tells which is right, one with the same contacts under both does
@@ -6,7 +6,7 @@ not. The information about a question with two answers is at most its entropy H(
 taken from the Bhattacharyya coefficient of its contacts under both answers: 1 - exp(-D), where a contact displaced by
 d adds d^2 / (8 s^2) to D, and a finger that meets something under one of them only as much as an unexplained contact.
 
-What hangs on the answer is every contact that the alternative places elsewhere: each of them tells something about the
+The answer affects every contact that the alternative places elsewhere: each of them is informative about the
 shape only where it belongs.
 """
 

@@ -57,7 +57,7 @@ def shared_contacts(
         contacts: contacts of all grasps, object frame, as placed so far.
         faces: the face of each contact.
         earlier, later: indices of the two grasps' contacts.
-        settings: what is asked for.
+        settings: the criteria.
     """
     pairs = [_partner(contacts, faces, earlier, index) for index in later if faces[index] != NO_FACE]
     found = np.array([pair for pair in pairs if pair is not None], dtype=np.intp).reshape(-1, 2)

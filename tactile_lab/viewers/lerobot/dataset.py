@@ -1,6 +1,6 @@
 """A session as a LeRobotDataset of codebase version 3.0: one episode of what was felt, done, seen and concluded.
 
-Written without ``lerobot``; the form is that of its dataset guide (Parquet tables, MP4 videos, JSON beside them).
+Written without ``lerobot``; the form is that of its dataset guide (Parquet tables, MP4 videos, JSON).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What a frame of a dataset holds of a moment: names, shapes, and how the values are read.
 
-Everything is a number, also where nothing is known yet: then it is 0, and a value beside it says so.
+Everything is a number; an unknown value is 0, and another value marks it as unknown.
 """
 
 from __future__ import annotations

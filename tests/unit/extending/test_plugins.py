@@ -155,7 +155,7 @@ def mine(settings, start):
     ("answer", "words"),
     [
         ("1 / 0", r"the method 'mine' raises ZeroDivisionError: division by zero \(line 7\)"),
-        ("return replace(super().estimate(), row=np.full(3, np.nan))", "gives a pose that is not finite"),
+        ("return replace(super().estimate(), pose=np.full(3, np.nan))", "gives a pose that is not finite"),
     ],
 )
 def test_a_method_that_fails_is_named_and_the_recording_is_said_to_be_kept(

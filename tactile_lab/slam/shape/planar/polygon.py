@@ -62,7 +62,7 @@ class Polygon:
             contacts: the contacts in which the faces were found.
             faces: at least three.
             provisional: an outline from which corners must not deviate, and that bridges gaps where faces do not meet;
-                straight lines bridge gaps if it is None or makes a long detour.
+                straight lines bridge gaps if it is None or detours far.
             corner_contacts: further contacts, which lie at corners and not on the faces.
 
         Raises:

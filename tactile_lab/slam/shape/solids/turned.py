@@ -43,7 +43,7 @@ _SPACING = 1.5
 _FOOT_SHARE, _UPRIGHT_SINE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, np.sin(np.deg2rad(20.0)), 0.2, 0.006
 """As for the standing field: how much of the height is mirrored at the table, and how far inward its walls move."""
 _SURE_SIGMAS = 2.0
-"""Walls go on below the table as inclined as they are only if they are not upright by this many standard deviations."""
+"""Walls continue below the table at their own inclination only if it differs from upright by this many sigmas."""
 
 
 @dataclass(frozen=True)
@@ -220,8 +220,8 @@ def _both_halves(half: Gpis, floor_m: float) -> Gpis:
 def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:
     """Virtual contacts that continue walls and bottom below the table, and walls again where they meet it.
 
-    Walls go on as they are inclined, slightly inward, as those of the standing field. What faces up is mirrored, as the
-    inside of a cup's bottom, which would have no thickness otherwise.
+    Walls continue at their inclination, slightly inward, as those of the standing field. What faces up is mirrored, as
+    the inside of a cup's bottom, which would have no thickness otherwise.
 
     Args:
         rows: of each contact place, normal and their two standard deviations, shape (n, 6).

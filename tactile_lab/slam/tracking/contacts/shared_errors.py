@@ -18,7 +18,7 @@ from drivers.core.contacts import Array, Contact
 
 @dataclass(frozen=True)
 class SharedErrors:
-    """Of some contacts; empty where nothing is known of any.
+    """Of some contacts; empty if unknown.
 
     Attributes:
         fingers: name of the finger of each contact, shape (n,).
@@ -43,7 +43,7 @@ class SharedErrors:
         return cls(fingers, np.concatenate([part.sigma_m for part in parts]))
 
     def of_count(self, count: int) -> SharedErrors:
-        """The same with an entry for each of so many contacts."""
+        """The same with an entry for each of this many contacts."""
         return self if len(self.fingers) == count else SharedErrors(np.full(count, ""), np.zeros(count))
 
     def select(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> SharedErrors:

@@ -1,8 +1,8 @@
 """Deferred association: places grasps later that could not be placed, or fitted badly, at first.
 
-Three ways lead there: the motion model from the neighbouring grasps; if the object was left in place, a push of the
-closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all (relocation).
-A grasp stays at its place, or left out, unless the evidence of all contacts improves.
+There are three possible explanations: the motion model from the neighbouring grasps; if the object was left in place, a
+push of the closing hand; and, if the object was lost, poses anywhere on the known object, which need no motion at all
+(relocation). A grasp stays at its place, or left out, unless the evidence of all contacts improves.
 
 While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
 near where the motion leads, two of them with their normals can be enough: otherwise grasps with two or three wrong
