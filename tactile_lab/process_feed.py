@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from drivers.core.child_process import child_command, child_environment
-from drivers.core.errors import DeviceError
+from drivers.core.errors import ConfigurationError, ProcessError, TactileLabError
 
 QUEUE_LENGTH = 400
 """Size of the queue in messages: about ten seconds of a session."""
@@ -31,7 +31,8 @@ class ProcessFeed(ABC):
     """Starts the process, sends it messages and receives its requests; a :class:`~.recorder.TrafficSink`.
 
     Args:
-        module: its program: reads settings and messages as lines of JSON, and says its ``url`` or a ``problem``.
+        module: its program: reads settings and messages as lines of JSON, and says its ``url``, or a ``problem`` with its
+            ``exit_code``.
         settings: its first line.
         name: for messages, such as ``page``.
         hint: what to do if it does not start.
@@ -46,13 +47,18 @@ class ProcessFeed(ABC):
         self._queue: queue.Queue[bytes | None] = queue.Queue(QUEUE_LENGTH)
         self._process: subprocess.Popen[bytes] | None = None
         self._ready = threading.Event()
-        self._problem = ""
+        self._problem: TactileLabError | None = None
         self._threads: list[threading.Thread] = []
 
     # --- lifecycle ---------------------------------------------------------------------------------------------
 
     def __enter__(self) -> Self:
-        """Start the process and wait until it listens. Raises DeviceError if it does not."""
+        """Start the process and wait until it listens.
+
+        Raises:
+            ConfigurationError: what it was given, such as an address, cannot be used.
+            ProcessError: it does not start.
+        """
         self._process = subprocess.Popen(
             child_command(self._module),
             stdin=subprocess.PIPE,
@@ -68,8 +74,7 @@ class ProcessFeed(ABC):
             self._threads.append(thread)
         if not self._ready.wait(START_TIMEOUT_s) or self._problem:
             self.close()
-            text = self._problem or f"did not start within {START_TIMEOUT_s:.0f} s"
-            raise DeviceError(text, where=self._name, hint=self._hint)
+            raise self._problem or self._failed(f"did not start within {START_TIMEOUT_s:.0f} s")
         return self
 
     def __exit__(
@@ -143,7 +148,7 @@ class ProcessFeed(ABC):
             while line := process.stdout.readline(_LINE_BYTES):
                 self._on_line(line)
         if not self._ready.is_set():
-            self._problem = self._problem or "ended before it listened"
+            self._problem = self._problem or self._failed("ended before it listened")
             self._ready.set()
 
     def _on_line(self, line: bytes) -> None:
@@ -151,12 +156,21 @@ class ProcessFeed(ABC):
         try:
             content = json.loads(line)
             if "url" in content or "problem" in content:
-                self.url, self._problem = str(content.get("url", "")), str(content.get("problem", ""))
+                self.url = str(content.get("url", ""))
+                self._problem = self._told(content) if "problem" in content else None
                 self._ready.set()
             else:
                 self.on_press(content)
         except (ValueError, TypeError, AttributeError):
             return
+
+    def _told(self, content: Mapping[str, Any]) -> TactileLabError:
+        """Why it does not start, in its own words."""
+        given = content.get("exit_code") == ConfigurationError.exit_code
+        return (ConfigurationError if given else ProcessError)(str(content["problem"]), where=self._name)
+
+    def _failed(self, what: str) -> ProcessError:
+        return ProcessError(what, where=self._name, hint=self._hint)
 
     @abstractmethod
     def is_shown(self, topic: str, data: bytes) -> bool:

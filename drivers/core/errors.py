@@ -8,6 +8,7 @@ TactileLabError                exit 1
  |- SessionError               exit 1   a session folder or its traffic file
  |   |- SessionDataError   exit 2   a session that was given: missing, damaged, or without the requested data
  |   `- EstimationError                 a program error during estimation or planning
+ |- ProcessError               exit 1   a process of this program that does not start, or has ended
  |- WriteError                 exit 1   a file that cannot be written: a full disk, a folder one may not write to
  |- ShapeError                 exit 1   a mesh, contour or model that cannot be used
  |- TrackingError              exit 1   the object cannot be followed any further
@@ -79,6 +80,10 @@ class SessionDataError(SessionError):
 
 class EstimationError(SessionError):
     """A program error in the estimation or planning of a running session; its notes say where."""
+
+
+class ProcessError(TactileLabError):
+    """A process of this program, such as that of a page, does not start, or has ended."""
 
 
 class WriteError(TactileLabError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -100,10 +101,23 @@ NoInput = Annotated[
     ),
 ]
 
+_SCHEDULER = re.compile(r"(?:(?:tcp|tls)://)?(?:\[[0-9a-fA-F:.]+\]|[^\s:/\[\]]+):([0-9]{1,5})")
+_LARGEST_PORT = 65_535
+
+
+def _scheduler_address(text: str) -> str:
+    """An address that cannot be one of a scheduler is told at once, not after a wait for its answer."""
+    found = _SCHEDULER.fullmatch(text)
+    if text and (found is None or not 0 < int(found[1]) <= _LARGEST_PORT):
+        raise typer.BadParameter(f"{text!r} is no address of a scheduler, such as tcp://host:8786.")
+    return text
+
+
 Scheduler = Annotated[
     str,
     typer.Option(
         metavar="ADDRESS",
+        callback=_scheduler_address,
         help="Run on the workers of this Dask scheduler (tcp://host:8786, or tls:// with Dask's own configuration).",
     ),
 ]

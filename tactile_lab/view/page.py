@@ -16,7 +16,7 @@ from typing import Literal, Self
 import viser
 from viser import _messages
 
-from drivers.core.errors import DeviceError, refusal
+from drivers.core.errors import ConfigurationError, refusal
 from sessions.guided.operator import Ask
 from tactile_lab.view.certificates import load_certificate
 from tactile_lab.view.controls import Controls
@@ -58,7 +58,7 @@ class Page:
         say: Say | None = None,
     ) -> None:
         if not token and not is_loopback(address):
-            raise DeviceError(
+            raise ConfigurationError(
                 "a token is needed to listen on this address", where=address, hint="Listen on 127.0.0.1, or use --token"
             )
         self._door, self._token = (address, port), token
@@ -79,7 +79,7 @@ class Page:
         """URL of the page, including the token."""
 
     def __enter__(self) -> Self:
-        """Start listening. Raises DeviceError if the address is not available."""
+        """Start listening. Raises ConfigurationError if the address is not available."""
         self._thread.start()
         address, port = self._door
         gate = Gate(_names(address), self._token, encrypted=self._encryption is not None)
@@ -89,7 +89,7 @@ class Page:
             server = opened.result(10)
         except (OSError, TimeoutError) as error:
             self.close()
-            raise DeviceError(
+            raise ConfigurationError(
                 f"cannot listen on port {port} ({refusal(error)})",
                 where=address,
                 hint="Choose another --view-port or --listen",

@@ -35,7 +35,7 @@ class Mouth:
 
 
 def main() -> int:
-    """Show messages until the input ends. Returns 1 if the page cannot be opened."""
+    """Show messages until the input ends. Returns the exit code."""
     mouth = Mouth()
     settings = json.loads(sys.stdin.buffer.readline())
     try:
@@ -45,8 +45,8 @@ def main() -> int:
             mouth.say(url=page.url)
             _show(page)
     except TactileLabError as error:
-        mouth.say(problem=str(error))
-        return 1
+        mouth.say(problem=str(error), exit_code=error.exit_code)
+        return error.exit_code
     except Exception as error:
         mouth.say(problem=failure(error))
         return 1

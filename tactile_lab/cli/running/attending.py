@@ -51,7 +51,8 @@ def attendance(
 
     Raises:
         ConfigurationError: the pedal's key is unknown, or a package is missing.
-        ConfigurationError, DeviceError: the page or the server cannot be opened there.
+        ConfigurationError: the page or the server cannot be opened there.
+        ProcessError: its process does not start.
     """
     with ExitStack() as stack:
         feed = None if page is None else stack.enter_context(_page(page, title))

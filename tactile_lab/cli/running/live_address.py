@@ -61,7 +61,7 @@ class LiveAddress:
 
 @contextmanager
 def serve_live(live: LiveAddress, title: str) -> Iterator[LiveFeed]:
-    """The server, while the session runs. Raises ConfigurationError, DeviceError."""
+    """The server, while the session runs. Raises ConfigurationError, ProcessError."""
     from drivers.core.installed.extras import require_package
     from tactile_lab.cli.console import say, warn
     from tactile_lab.viewers.live.feed import LiveFeed

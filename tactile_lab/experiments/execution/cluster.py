@@ -9,6 +9,7 @@ Connections are encrypted where the address begins with ``tls://``; Dask's own c
 
 from __future__ import annotations
 
+import asyncio
 import os
 import time
 from collections.abc import Iterable, Iterator, Sequence
@@ -60,16 +61,37 @@ def run_on_cluster(cells: Sequence[Cell], work: Work, address: str, shared: Path
 def _connected(address: str) -> Iterator[Client]:
     from distributed import Client
 
+    hint = "Start one with: dask scheduler; and workers with: dask worker ADDRESS --nworkers auto --nthreads 1"
     try:
+        asyncio.run(_greet(address))
         client = Client(address, timeout=_CONNECT_s)
-    except (OSError, TimeoutError, ValueError, TypeError) as error:
-        hint = "Start one with: dask scheduler; and workers with: dask worker ADDRESS --nworkers auto --nthreads 1"
+    except (OSError, ValueError, TypeError) as error:
         raise ConfigurationError(f"no scheduler answers ({error})", where=address, hint=hint) from error
+    except MemoryError as error:  # words of another protocol, taken for the length of a message
+        hint = "Give the scheduler's own port: 8786 by default, 8787 is its web page"
+        raise ConfigurationError("something else than a scheduler answers", where=address, hint=hint) from error
     try:
         yield client
     finally:
         with suppress(OSError, TimeoutError):
             client.close(timeout=_CONNECT_s)
+
+
+async def _greet(address: str) -> None:
+    """Exchange greetings, once: a client would wait without end for whoever accepts a connection and says nothing.
+
+    Raises:
+        OSError, ValueError, TypeError, MemoryError: nobody answers in time, or not as a scheduler does.
+    """
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    safety = Security().get_connection_args("client")
+    try:
+        comm = await asyncio.wait_for(connect(address, timeout=_CONNECT_s, **safety), 2 * _CONNECT_s)
+    except TimeoutError as error:
+        raise TimeoutError(f"silent for {2 * _CONNECT_s:.0f} s") from error
+    await comm.close()
 
 
 # --- what a cluster has to be --------------------------------------------------------------------------------------

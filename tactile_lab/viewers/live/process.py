@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from drivers.core.child_process import failure
-from drivers.core.errors import DeviceError, TactileLabError, refusal
+from drivers.core.errors import ConfigurationError, TactileLabError, refusal
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.viewers.camera_pose import camera_of_rig
 from tactile_lab.viewers.encoded import Encoded
@@ -27,13 +27,13 @@ from tactile_lab.viewers.story import Story
 
 
 def main() -> int:
-    """Serve until the input ends. Returns 1 if the server cannot be opened."""
+    """Serve until the input ends. Returns the exit code."""
     settings = json.loads(sys.stdin.buffer.readline())
     try:
         asyncio.run(_serve(settings))
     except TactileLabError as error:
-        _say(problem=str(error))
-        return 1
+        _say(problem=str(error), exit_code=error.exit_code)
+        return error.exit_code
     except Exception as error:
         _say(problem=failure(error))
         return 1
@@ -77,7 +77,7 @@ async def _serve(settings: dict[str, Any]) -> None:
             await ended.wait()
     except OSError as error:
         what = f"cannot listen on {settings['address']}:{settings['port']} ({refusal(error)})"
-        raise DeviceError(what, where="live", hint="Choose another --live-port") from error
+        raise ConfigurationError(what, hint="Choose another --live-port") from error
 
 
 def _read(conversion: Conversion, server: LiveServer, loop: asyncio.AbstractEventLoop, ended: asyncio.Event) -> None:

@@ -16,7 +16,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
-from drivers.core.errors import DeviceError
+from drivers.core.errors import ConfigurationError
 from tactile_lab.viewers.ros2.dds_types import TriggerReply, TriggerRequest, message_type, type_hash
 from tactile_lab.viewers.ros2.node import NODE, Answer, Reach
 
@@ -48,7 +48,7 @@ class DdsNode:
         reach: who can see it. A configuration of Cyclone's own (``CYCLONEDDS_URI``) is heeded for the network alone.
 
     Raises:
-        DeviceError: DDS cannot be opened.
+        ConfigurationError: DDS cannot be opened.
     """
 
     def __init__(self, reach: Reach) -> None:
@@ -57,7 +57,7 @@ class DdsNode:
             self._participant = DomainParticipant(reach.domain)
         except DDSException as error:
             hint = "Choose another --domain, or check the network's configuration"
-            raise DeviceError(f"DDS cannot be opened ({error})", where="ros2", hint=hint) from error
+            raise ConfigurationError(f"DDS cannot be opened ({error})", where="ros2", hint=hint) from error
         self._writers: dict[str, DataWriter[Any]] = {}
         self._services: list[tuple[DataReader[Any], DataWriter[Any], Answer]] = []
         self._lock, self._ended = threading.Lock(), threading.Event()

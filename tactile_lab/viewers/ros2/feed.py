@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from drivers.core.errors import DeviceError
+from drivers.core.errors import ProcessError
 from sessions.guided.operator import Ask, Panel, Request, request_of
 from sessions.recording.traffic import schemas
 from tactile_lab.process_feed import ProcessFeed
@@ -55,13 +55,13 @@ class Ros2Feed(ProcessFeed):
         """Whether a session is to begin; waits for this time at most.
 
         Raises:
-            DeviceError: the bridge's process has ended.
+            ProcessError: the bridge's process has ended.
         """
         if self._started.wait(patience_s):
             return True
         if not self.running:
             hint = "Start the bridge again"
-            raise DeviceError("the process of the bridge has ended", where="ros2", hint=hint)
+            raise ProcessError("the process of the bridge has ended", where="ros2", hint=hint)
         return False
 
     def begin(self, *, guided: bool) -> None:

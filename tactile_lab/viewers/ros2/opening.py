@@ -24,8 +24,7 @@ def open_node(reach: Reach) -> Node:
     """A node by ROS 2's own library where there is one, by Cyclone DDS elsewhere.
 
     Raises:
-        ConfigurationError: neither is installed.
-        DeviceError: the node cannot be opened.
+        ConfigurationError: neither is installed, or the node cannot be opened.
     """
     require_ros2()
     if has_rclpy():

@@ -25,14 +25,14 @@ from tactile_lab.viewers.ros2.services import SERVICES, Services
 
 
 def main() -> int:
-    """Bridge until the input ends. Returns 1 if the node cannot be opened."""
+    """Bridge until the input ends. Returns the exit code."""
     settings = json.loads(sys.stdin.buffer.readline())
     try:
         conversion = Conversion(settings["rig"], time.time_ns)
         node = open_node(Reach(settings["domain"], settings["network"]))
     except TactileLabError as error:
-        _say({"problem": str(error)})
-        return 1
+        _say({"problem": str(error), "exit_code": error.exit_code})
+        return error.exit_code
     except Exception as error:
         _say({"problem": failure(error)})
         return 1

@@ -23,7 +23,7 @@ from gtsam import Pose3, Rot3
 from typer import BadParameter
 
 from drivers.core.contacts import Contact, Grasp
-from drivers.core.errors import ConfigurationError, DeviceError
+from drivers.core.errors import ConfigurationError
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal
 from sessions.guided.operator import Ask
 from sessions.recording.recorder import Level, Recorder
@@ -263,7 +263,7 @@ def test_other_addresses_need_a_token() -> None:
         assert PageAddress(address, 8090, "").check()[2] != PageAddress(address, 8090, "").check()[2]
     with pytest.raises(BadParameter, match="needs --view"):
         PageAddress.if_wanted(False, "0.0.0.0", 8090, "")
-    with pytest.raises(DeviceError, match="a token is needed"):
+    with pytest.raises(ConfigurationError, match="a token is needed"):
         Page("0.0.0.0", 0, "", "test")
 
 
@@ -448,7 +448,7 @@ def test_page_that_can_not_open_is_told() -> None:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        with pytest.raises(DeviceError, match="cannot listen"), ViewFeed("127.0.0.1", port, "", "test"):
+        with pytest.raises(ConfigurationError, match="cannot listen"), ViewFeed("127.0.0.1", port, "", "test"):
             pass
 
 

@@ -16,7 +16,7 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
-from drivers.core.errors import DeviceError
+from drivers.core.errors import ConfigurationError
 from tactile_lab import process_feed
 from tactile_lab.cli.running.live_address import LIVE_PORT, LiveAddress
 from tactile_lab.process_feed import QUEUE_LENGTH
@@ -218,7 +218,7 @@ def run(work: Any) -> Any:
 def test_a_port_that_is_taken_is_said_in_one_sentence(feed):
     port = int(feed.url.split(":")[2].partition("/")[0])
     with (
-        pytest.raises(DeviceError, match=r"cannot listen on 127\.0\.0\.1:") as refused,
+        pytest.raises(ConfigurationError, match=r"cannot listen on 127\.0\.0\.1:") as refused,
         LiveFeed("sim", "127.0.0.1", port, TOKEN, "second"),
     ):
         pass

@@ -13,7 +13,7 @@ import pytest
 from rosbags.typesys import Stores, get_typestore
 
 from drivers.core.clock import NANOSECONDS
-from drivers.core.errors import ConfigurationError, DeviceError
+from drivers.core.errors import ConfigurationError, ProcessError
 from sessions.guided.operator import Ask, Request
 from tactile_lab import process_feed
 from tactile_lab.viewers.ros2 import opening
@@ -137,7 +137,7 @@ def test_what_the_bridge_asks_reaches_the_session_and_nothing_else_does():
         feed.on_press({"ask": "explode"})
     assert feed.requests() == [Request(Ask.CAPTURE)]
     assert feed.requests() == []
-    with pytest.raises(DeviceError, match="has ended"):
+    with pytest.raises(ProcessError, match="has ended"):
         feed.wait_for_start(0.0)
     feed.on_press({"ask": "start"})
     assert feed.wait_for_start(0.0)

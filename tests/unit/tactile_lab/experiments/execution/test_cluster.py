@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -131,6 +133,37 @@ def test_a_scheduler_that_ends_ends_the_experiment(tmp_path: Path) -> None:
             run_cells(
                 "test", CELLS, cluster_work.square, tmp_path / "r.jsonl", settings, lambda *_: started.end_scheduler()
             )
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        (b"", "no scheduler answers .silent for"),
+        (b"HTTP/1.1 400 Bad Request\r\n\r\n", "something else.*8787 is its web page"),
+    ],
+)
+def test_whoever_listens_there_but_is_no_scheduler_holds_nothing_up(
+    said: bytes, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "_CONNECT_s", 0.5)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            visitor, _ = server.accept()
+            with visitor:
+                visitor.sendall(said)
+                while visitor.recv(4096):
+                    pass
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        with pytest.raises(ConfigurationError, match=words), cluster_module._connected(_address(server)):
+            pass
+        thread.join(10)
+
+
+def _address(server: socket.socket) -> str:
+    return f"tcp://127.0.0.1:{server.getsockname()[1]}"
 
 
 @pytest.mark.long  # it is given time
