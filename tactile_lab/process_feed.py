@@ -31,8 +31,8 @@ class ProcessFeed(ABC):
     """Starts the process, sends it messages and receives its requests; a :class:`~.recorder.TrafficSink`.
 
     Args:
-        module: its program: reads settings and messages as lines of JSON, and says its ``url``, or a ``problem`` with its
-            ``exit_code``.
+        module: its program: reads settings and messages as lines of JSON, and says its ``url``, or a ``problem``
+            with its ``exit_code``.
         settings: its first line.
         name: for messages, such as ``page``.
         hint: what to do if it does not start.

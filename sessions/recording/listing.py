@@ -152,6 +152,9 @@ def session_folder(root: Path, name: str) -> Path:
     for path in (root / name, Path(name)):
         refuse_unreachable(path)
     folder = root / name if (root / name).is_dir() else Path(name)
+    if folder.is_file() and _is_session(folder.parent):
+        hint = f"Name the folder: {folder.parent}"
+        raise ConfigurationError("is a file of a session", where=name, hint=hint)
     if not folder.is_dir():
         raise ConfigurationError("no such session", where=name, hint=f"See: tactile-lab session list --root {root}")
     if not any((folder / name).is_file() for name in (MANIFEST, TRAFFIC)):

@@ -20,6 +20,7 @@ app = typer.Typer(
     epilog="Exit codes: 0 done; 1 failed; 2 not begun, by an option or file that cannot be used; 3 done, but data or "
     "the object were lost, or a limit was passed; 4 a device is not ready; 130 interrupted (docs/command-line.md).",
     no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},  # of all commands
     rich_markup_mode="markdown",  # lines of a paragraph flow together
     pretty_exceptions_enable=False,
 )
@@ -57,7 +58,7 @@ def _load_extensions(files: list[Path] | None) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+        bool, typer.Option("--version", "-V", callback=_show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
     extension: Annotated[
         list[Path] | None,

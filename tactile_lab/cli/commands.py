@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typer.core import TyperGroup
 
 from drivers.core.reading.bounded_files import refuse_unreachable
 from drivers.core.registry import Registry
+from tactile_lab.cli.streams import UNWRITABLE
 
 COMMANDS: Registry[Callable[..., None] | typer.Typer] = Registry("command")
 """By command name: a function that typer makes a command, or a :class:`typer.Typer` with subcommands.
@@ -19,9 +21,18 @@ COMMANDS: Registry[Callable[..., None] | typer.Typer] = Registry("command")
 See ``docs/extending.md`` for adding one.
 """
 
+_AT_HOME = re.compile(r"(mesh:)?(~(?:/.*)?)", re.DOTALL)
+
 
 class Commands(TyperGroup):
     """Looks up commands in :data:`COMMANDS` lazily: extensions register theirs while options are parsed."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As usual, and ``help COMMAND`` is ``COMMAND --help``."""
+        if args[:1] == ["help"] and "help" not in COMMANDS:
+            args = [*args[1:], "--help"]
+        rest: list[str] = _answered(super().parse_args)(ctx, args)
+        return rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; a mistake in an option gets a plain message, whichever library found it."""
@@ -32,6 +43,13 @@ class Commands(TyperGroup):
 
             error.message = plain_words(error.message)
             raise
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """The command that is named; for a name that is none, those like it are proposed."""
+        if args[0] not in COMMANDS:
+            for name in COMMANDS:
+                self.get_command(ctx, name)  # proposed are those that were made
+        return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: Any) -> list[str]:
         """All names in order of registration."""
@@ -47,6 +65,29 @@ class Commands(TyperGroup):
         return self.commands[cmd_name]
 
 
+def _answered(parse: Callable[..., Any]) -> Callable[..., Any]:
+    """Parses options; typer writes help, version and completion by itself meanwhile. Where it cannot, that is told, or
+    not, as of any other answer.
+    """
+
+    def parsed(ctx: Any, args: list[str]) -> Any:
+        try:
+            return parse(ctx, args)
+        except OSError as error:
+            if error.filename is not None or error.errno not in UNWRITABLE:
+                raise
+            from tactile_lab.cli.console import give_up_answer
+
+            give_up_answer(error)
+            raise typer.Exit from error
+        except SystemExit as ended:
+            if isinstance(ended.__context__, BrokenPipeError):  # told by the library that draws help, as a failure
+                raise typer.Exit from ended
+            raise
+
+    return parsed
+
+
 def _command(name: str) -> Any:
     registered = COMMANDS[name]
     if isinstance(registered, typer.Typer):
@@ -60,10 +101,12 @@ def _command(name: str) -> Any:
 
 def _check_values(command: Any) -> None:
     """No option of a command, or of its commands, takes nan or inf for a number, which bounds alone let through, bytes
-    that are no text, or a path of which nothing can be found out.
+    that are no text, nothing at all, or a path of which nothing can be found out.
     """
+    command.parse_args = _answered(command.parse_args)
     for parameter in command.params:
         parameter.callback = _checked(parameter.callback)
+        parameter.process_value = _as_meant(parameter, parameter.process_value)
     for inner in getattr(command, "commands", {}).values():
         _check_values(inner)
 
@@ -82,6 +125,26 @@ def _checked(then: Callable[..., Any] | None) -> Callable[..., Any]:
         return value if then is None else then(ctx, parameter, value)
 
     return check
+
+
+def _as_meant(parameter: Any, then: Callable[..., Any]) -> Callable[..., Any]:
+    """Makes a value of a word.
+
+    An empty one is that of a variable that is not set, and would be taken for the current folder. ``--out=~/runs`` and
+    ``mesh:~/cup.stl`` mean the home folder, which shells put in at the beginning of a word only.
+
+    Raises:
+        BadParameter: the word is empty, and that means nothing.
+    """
+
+    def process(ctx: Any, word: Any) -> Any:
+        if word == "" and parameter.default != "":
+            raise typer.BadParameter("must not be empty", ctx=ctx, param=parameter)
+        if isinstance(word, str) and (found := _AT_HOME.fullmatch(word)):
+            word = f"{found[1] or ''}{Path(found[2]).expanduser()}"
+        return then(ctx, word)
+
+    return process
 
 
 def _is_text(words: str) -> bool:

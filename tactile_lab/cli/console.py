@@ -18,6 +18,7 @@ from drivers.core.atomic_files import write_failure
 from drivers.core.errors import WriteError
 from tactile_lab.cli.streams import GONE, LastingStream
 from tactile_lab.cli.table_forms import facts_form, table_form
+from tactile_lab.cli.visible import visible
 
 _out, _err = LastingStream("stdout"), LastingStream("stderr")
 
@@ -42,6 +43,11 @@ def keep_output_for_json(wanted: bool) -> None:
 def answers() -> Console:
     """Where what was asked for is shown: standard output, unless that is for a JSON document."""
     return people if _json_only else _answers
+
+
+def give_up_answer(error: OSError) -> None:
+    """Standard output cannot be written: :func:`check_output` tells, and what is written to it goes nowhere."""
+    _out.give_up(error)
 
 
 def check_output() -> None:
@@ -75,12 +81,12 @@ def tell_also(onlooker: Onlooker) -> Iterator[None]:
 
 def say(text: str, style: str = "") -> None:
     """A line of progress, or a remark; printed literally (no markup, no wrapping)."""
-    _tell(people, Text(text, style=style), style)
+    _tell(people, Text(visible(text), style=style), style)
 
 
 def answer(text: str, style: str = "") -> None:
     """A line of what was asked for."""
-    _tell(answers(), Text(text, style=style), style)
+    _tell(answers(), Text(visible(text), style=style), style)
 
 
 def count(number: int, noun: str) -> str:
@@ -90,12 +96,12 @@ def count(number: int, noun: str) -> str:
 
 def complain(text: str) -> None:
     """One error line for people."""
-    _tell(people, Text.assemble(("error: ", "bold red"), text), "bold red")
+    _tell(people, Text.assemble(("error: ", "bold red"), visible(text)), "bold red")
 
 
 def warn(text: str) -> None:
     """One warning line for people."""
-    _tell(people, Text.assemble(("warning: ", "bold yellow"), text), "bold yellow")
+    _tell(people, Text.assemble(("warning: ", "bold yellow"), visible(text)), "bold yellow")
 
 
 def _tell(where: Console, line: Text, style: str) -> None:
@@ -134,7 +140,7 @@ def show_table(
 def show_facts(title: str, facts: Iterable[tuple[str, str]]) -> None:
     """Names with values; empty values are left out."""
     shown = [(name, value) for name, value in facts if value]
-    answers().print(Text(title, style="bold"), soft_wrap=True)
+    answers().print(Text(visible(title), style="bold"), soft_wrap=True)
     answers().print(facts_form(answers(), shown), crop=False)
     for onlooker in _onlookers:
         onlooker.table(title, ("", ""), shown, ())

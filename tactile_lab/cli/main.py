@@ -20,6 +20,8 @@ from tactile_lab.cli.streams import open_missing_streams
 
 _WORDS_OF_NO_MEMORY = ("can't start new thread", "ould not allocate memory", "Insufficient memory")
 """Of Python, MuJoCo and OpenCV, whose errors have no type for it."""
+_NARROWEST = 20
+"""Columns that a terminal has at least."""
 _NO_MEMORY = "the memory is exhausted. Close other programs, or raise the limit (ulimit -v)"
 
 # Sums of several BLAS threads come out in another order, and a replay must give the same bytes on any machine.
@@ -28,6 +30,8 @@ os.environ.update(OPENBLAS_NUM_THREADS="1", OMP_NUM_THREADS="1")
 os.environ.setdefault(
     "OPENCV_IO_MAX_IMAGE_PIXELS", "100000000"
 )  # a packed picture of 100 kB may claim a thousand million
+if os.environ.get("COLUMNS", "").isdecimal() and int(os.environ["COLUMNS"]) < _NARROWEST:
+    del os.environ["COLUMNS"]  # that of a terminal whose size nobody knew: nothing at all would be shown
 os.environ.setdefault("OPENCV_LOG_LEVEL", "ERROR")  # its warnings speak of its own source lines
 
 

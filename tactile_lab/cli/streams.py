@@ -13,6 +13,8 @@ from typing import Literal, TextIO
 
 GONE = (errno.EPIPE, errno.EIO, errno.EBADF)
 """The reader has closed the pipe, or the terminal has gone: no failure of the program."""
+UNWRITABLE = (*GONE, errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""A stream that cannot be written any more."""
 
 
 def open_missing_streams() -> None:
@@ -68,7 +70,7 @@ class LastingStream:
             try:
                 self._stream.write(self._shown(text))
             except OSError as error:
-                self._give_up(error)
+                self.give_up(error)
         return len(text)
 
     def _shown(self, text: str) -> str:
@@ -81,9 +83,9 @@ class LastingStream:
             try:
                 self._stream.flush()
             except OSError as error:
-                self._give_up(error)
+                self.give_up(error)
 
-    def _give_up(self, error: OSError) -> None:
+    def give_up(self, error: OSError) -> None:
         """What Python still holds of it goes to the null device, so that nothing complains at the end."""
         self.failure = error
         null = os.open(os.devnull, os.O_WRONLY)

@@ -11,6 +11,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tactile_lab.cli.visible import visible
+
 _LAST_COLUMN = 24
 """Minimum width of the last column when it is wrapped."""
 _GAP, _EDGES = 3, 2
@@ -25,24 +27,27 @@ def table_form(
 ) -> RenderableType:
     """A table as a console shows it.
 
-    A terminal that is too narrow gets blocks. In a file or a pipe a table may be as wide as needed.
+    A terminal that is too narrow gets blocks. In a file or a pipe a row is one line, as wide as needed.
 
     Args:
         right: indices of the columns that hold numbers.
     """
-    *widths, last = [max(map(_width, column)) for column in zip(columns, *rows, strict=True)]
+    title, shown = visible(title), [[visible(cell) for cell in row] for row in rows]
+    *widths, last = [max(map(_width, column)) for column in zip(columns, *shown, strict=True)]
     others = sum(widths) + _GAP * len(widths) + _EDGES
-    fits = others + min(last, _LAST_COLUMN) <= console.width
-    if not fits and console.is_terminal:
-        return _blocks(title, columns, rows)
-    return _table(title, columns, rows, right, None if fits else others + last)
+    if not console.is_terminal:
+        return _table(title, columns, shown, right, max(others + last, _width(title)))
+    if others + min(last, _LAST_COLUMN) > console.width:
+        return _blocks(title, columns, shown)
+    return _table(title, columns, shown, right, None)
 
 
 def facts_form(console: Console, facts: Rows) -> Table:
     """Names with values as a console shows them: long values are wrapped on a terminal, but not in a file or a pipe."""
     grid = facts_grid(facts)
     if not console.is_terminal:
-        grid.width = sum(max(map(_width, column), default=0) for column in zip(*facts, strict=True)) + _INDENT
+        shown = ((visible(cell) for cell in fact) for fact in facts)
+        grid.width = sum(max(map(_width, column), default=0) for column in zip(*shown, strict=True)) + _INDENT
     return grid
 
 
@@ -52,7 +57,7 @@ def facts_grid(facts: Rows) -> Table:
     grid.add_column(style="dim", no_wrap=True)
     grid.add_column(overflow="fold")
     for name, value in facts:
-        grid.add_row(Text(name), Text(value))
+        grid.add_row(Text(visible(name)), Text(visible(value)))
     return grid
 
 
@@ -61,7 +66,7 @@ def _width(cell: str) -> int:
 
 
 def _table(title: str, columns: Sequence[str], rows: Rows, right: Sequence[int], width: int | None) -> Table:
-    """Rows and columns; as wide as needed if width is None."""
+    """Rows and columns; as wide as the console allows if width is None."""
     grid = Table(
         box=box.SIMPLE_HEAD, title=Text(title), title_justify="left", title_style="bold", pad_edge=False, width=width
     )

@@ -50,8 +50,8 @@ def attendance(
         title: title of the page.
 
     Raises:
-        ConfigurationError: the pedal's key is unknown, or a package is missing.
-        ConfigurationError: the page or the server cannot be opened there.
+        ConfigurationError: the pedal's key is unknown, a package is missing, or the page or the server cannot be opened
+            there.
         ProcessError: its process does not start.
     """
     with ExitStack() as stack:

@@ -69,7 +69,7 @@ def _consistency(content: Mapping[str, Any]) -> list[Table]:
         return []
     grid = _grid(("truth inside the stated", *(f"{100 * level:.0f} %" for level in judged["levels"])), "")
     for label, found in known:
-        scored = f"NEES {found['nees']:.2f}" if "nees" in found else f"mean error {found['signed_mm']:+.2f} mm"
+        scored = f"NEES {found['nees']:.2f}" if "nees" in found else f"mean {found['signed_mm']:+.2f} mm"
         grid.add_row(label, *(f"{100 * share:.0f} %" for share in found["inside"]), scored)
     return [grid]
 

@@ -73,6 +73,14 @@ def test_a_pipe_gets_one_line_a_row_however_wide(shown):
     assert row.endswith(REASON)
 
 
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_table_shows_characters_that_command_terminals_and_obeys_none(shown, terminal):
+    lines = shown(80, ["session", "notes"], [["a", "\x1b[2Jgone\rand \u202eback"]], terminal=terminal, title="\aT")
+    (row,) = [line for line in lines if "gone" in line]
+    assert row.split() == ["a", r"\x1b[2Jgone\rand", r"\u202eback"]
+    assert lines[0] == r"\x07T"
+
+
 def test_a_table_without_rows_shows_its_head(shown):
     assert any("session" in line for line in shown(80, ["session", "status"], []))
 
