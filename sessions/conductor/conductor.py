@@ -6,10 +6,10 @@
 from __future__ import annotations
 
 import numpy as np
-from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import TactileLabError
+from sessions.conductor.carrier import Carrier
 from sessions.conductor.decisions import DoGrasp, End, GraspAbandonedError, Pause, SessionRoles, UndoGrasp, Veto, Wait
 from sessions.conductor.estimation import Estimation
 from sessions.conductor.estimator import Estimate, Reorientation
@@ -17,7 +17,7 @@ from sessions.conductor.object_gone import blocked, lost, not_found
 from sessions.conductor.progress import GraspReport, NullProgress, Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.conductor.settings import ConductorSettings
-from sessions.motion.grasp_plan import GraspPlan, holds
+from sessions.motion.grasp_plan import GraspPlan
 from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
@@ -42,7 +42,8 @@ class Conductor:
         self._runtime, self._settings = runtime, settings
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = roles.supervisor, roles.performer, roles.decisions
-        self._survey, self._guard, self._weigh = roles.survey, roles.guard, roles.weigh
+        self._survey, self._guard = roles.survey, roles.guard
+        self._carrier = Carrier(runtime, roles, self._phase, self._tell)
         self._guard.heard = self._progress.on_interrupt
         self._estimation = Estimation(runtime, roles.estimator)
         self._prepared: int | None = None
@@ -244,46 +245,11 @@ class Conductor:
         return arrived
 
     def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:
-        """Squeeze, and re-orient the object, unless it stays in place, too few fingers hold it or no grasp follows."""
-        cycle, touching = self._cycle, grasp.touching
-        self._supervisor.count_contacts(len(grasp.contacts))
-        hand_motion = Pose3()
-        last = len(self._grasps) >= self._settings.grasps or self._guard.requested
-        if holds(touching) and len(self._grasps) <= self._settings.weighings and not self._guard.requested:
-            self._weigh_object(touching)
-            hand_motion = self._tell_carry() or hand_motion
-        if wanted.moves and holds(touching) and not last:
-            self._phase("squeeze")
-            cycle.squeeze(touching)
-            self._phase("re-orient")
-            hand_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, touching)
-            if cycle.jammed:
-                self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: re-orientation stopped early")
-            hand_motion = self._tell_carry() or hand_motion
-        self._decisions.on_carry(hand_motion)
-
-    def _weigh_object(self, touching: frozenset[str]) -> None:
-        """Weigh the held object, if this session can and nobody objects."""
-        if self._weigh is None:
-            return
-        if not self._decisions.may_weigh(self._cycle.plan):
-            self._tell(Level.INFO, "the object is not weighed")
-            return
-        self._phase("weigh")
-        end = self._weigh(touching)
-        known = self._runtime.perception.properties.in_words()
-        self._tell(Level.INFO, f"weighed: {end}; {known}")
-
-    def _tell_carry(self) -> Pose3 | None:
-        """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""
-        perception = self._runtime.perception
-        if (carry := perception.carry) is None:
-            return None
-        level = Level.WARNING if carry.is_remarkable else Level.INFO
-        self._runtime.log(level, "odometry", f"the object {carry.in_words()}")
-        if carry.is_remarkable:
-            self._progress.on_message(f"the object {carry.in_words()}")
-        return perception.hand_motion_world
+        """Weigh and re-orient the object, as far as that is wanted and a grasp follows."""
+        interrupted, count = self._guard.requested, len(self._grasps)
+        weighed = count <= self._settings.weighings and not interrupted
+        last = count >= self._settings.grasps or interrupted
+        self._carrier.carry(grasp, wanted, weighed=weighed, last=last)
 
     def _let_go(self) -> None:
         if self._cycle.plan.only_touch:

@@ -20,6 +20,7 @@ from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.safety import InterruptGuard, SafetySupervisor
 from sessions.motion.weighing import LiftEnd
+from sessions.perception.carrying.forecast import Forecast
 
 
 @dataclass(frozen=True)
@@ -148,6 +149,8 @@ class SessionRoles:
         decisions: decides about them.
         estimator: client of estimator and planner; open while the session runs.
         weigh: drags and lifts the object that these fingers hold; None for a session that cannot.
+        foretell: foretells a carry by a turn (radians, about the vertical) and a shift (metres, world), and fits the
+            force of the fingers to it; None for a session that cannot.
         survey: measures the object's bounding box before the first grasp; its argument returns whether to skip the
             rest. None for a session without it.
         guard: receives Ctrl+C while the session runs; code that waits for a person checks it.
@@ -158,6 +161,7 @@ class SessionRoles:
     decisions: DecisionMaker
     estimator: EstimatorClient
     weigh: Callable[[frozenset[str]], LiftEnd] | None = None
+    foretell: Callable[[Grasp, float, Array], Forecast | None] | None = None
     survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
     guard: InterruptGuard = field(default_factory=InterruptGuard)
 

@@ -173,7 +173,7 @@ class GraspByKeys(GraspCycle):
         wanted = f"{np.degrees(turn_rad):+.0f}°"
         prompt = f"Turn the object. g: {wanted} as suggested; comma, full stop, arrows: steps; SPACE: done"
         self._console.enter(Stage.ROTATE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.UNDO)
-        hold_N = self.fingers.balanced_forces_N(touching, self.settings.squeeze_force_N)
+        hold_N = self.fingers.balanced_forces_N(touching, self.holding_N)
         motion, jog = Pose3(), self._console.settings
         for request in self._guided.requests(lambda: self.fingers.servo_forces(hold_N)):
             if request.ask is Ask.GO:

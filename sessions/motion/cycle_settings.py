@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydantic import Field
 
 from drivers.core.configuration import StrictModel
+from sessions.motion.holding import HoldingSettings
 from sessions.motion.weighing import WeighingSettings
 
 
@@ -81,6 +82,7 @@ class CycleSettings(StrictModel):
         rest_s: rest after every motion that precedes a measurement.
         capture_s: length of the capture (20 samples at 100 Hz).
         squeeze_force_N: force of each finger while the object is carried; the thumb holds against their sum.
+        holding: that force for an object whose friction on the table was measured.
         squeeze_s: time to build the squeeze up.
         squeeze_gain: fingertip speed per force error, m/s per N.
         ease_force_N: force of each finger when a carried object is let go; the thumb balances the others.
@@ -116,6 +118,7 @@ class CycleSettings(StrictModel):
     rest_s: float = Field(default=0.2, gt=0.0)
     capture_s: float = Field(default=0.2, gt=0.0)
     squeeze_force_N: float = Field(default=0.8, gt=0.0)
+    holding: HoldingSettings = HoldingSettings()
     squeeze_s: float = Field(default=0.5, gt=0.0)
     squeeze_gain: float = Field(default=0.02, gt=0.0)
     ease_force_N: float = Field(default=0.15, gt=0.0)

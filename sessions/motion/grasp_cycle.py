@@ -16,11 +16,13 @@ from sessions.motion.grasp_fingers import GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
+from sessions.motion.holding import HoldingForces
 from sessions.motion.motion import Motion
 from sessions.motion.side_survey import LOW_m
 from sessions.motion.touching import SideTouch, Toucher
 from sessions.motion.travel import travel_height_m
 from sessions.motion.weighing import Grip, LiftEnd, Weigher
+from sessions.perception.carrying.forecast import Forecast, IntendedCarry
 
 _LEAST_HOLD_N = 0.1
 """A fingertip that presses less holds nothing."""
@@ -54,6 +56,9 @@ class GraspCycle:
 
         self.landings_world_m: list[Array] = []
         """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
+
+        self.holding_N = settings.squeeze_force_N
+        """Force of each finger while the object is carried; :meth:`foretell` fits it to what is known of the object."""
 
         self.jammed: tuple[str, ...] = ()
         """The fingertips that were pressed so hard in the last re-orientation that it stopped early."""
@@ -209,9 +214,38 @@ class GraspCycle:
 
     # --- carry -------------------------------------------------------------------------------------------------
 
+    def foretell(self, grasp: Grasp, turn_rad: float, shift_world_m: Array) -> Forecast | None:
+        """What will become of the object in this carry, which is then held as hard as it needs; None if its friction on
+        the table was not measured: then it is held with the usual force.
+        """
+        s, odometry = self.settings, self._motion.runtime.perception.held.odometry
+        self.holding_N = s.squeeze_force_N
+        if odometry.measured.table_N is None:
+            return None
+
+        def balanced_N(force_N: float) -> dict[str, float]:
+            return self.fingers.balanced_forces_N(grasp.touching, force_N)
+
+        contacts = [contact for contact in grasp.contacts if contact.finger in grasp.touching]
+        start, end = (frame.planar for frame in (self.plan.frame, self._carried_to(1.0, turn_rad, shift_world_m)))
+        duration_s = self._carry_s(turn_rad, shift_world_m)
+        intended = IntendedCarry.of(contacts, start, end, duration_s, s.squeeze_gain)
+        grip = HoldingForces(balanced_N, s.holding, s.squeeze_force_N, s.pressed_N)
+        forecast = grip.choose(intended, odometry)
+        self.holding_N = forecast.force_N
+        return forecast
+
+    def _carried_to(self, share: float, turn_rad: float, shift_world_m: Array) -> GraspFrame:
+        dx, dy = share * shift_world_m
+        return self.plan.frame.move(float(dx), float(dy), share * turn_rad)
+
+    def _carry_s(self, turn_rad: float, shift_world_m: Array) -> float:
+        s = self.settings
+        return max(abs(turn_rad) / s.carry_turn_rad_s, float(np.linalg.norm(shift_world_m)) / s.carry_m_s)
+
     def squeeze(self, touching: frozenset[str]) -> None:
         """Build up the holding force of the fingers that touch; the thumb holds against their sum."""
-        targets_N = self.fingers.balanced_forces_N(touching, self.settings.squeeze_force_N)
+        targets_N = self.fingers.balanced_forces_N(touching, self.holding_N)
         self.fingers.build_up(targets_N, self.settings.squeeze_s)
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
@@ -226,17 +260,8 @@ class GraspCycle:
         Returns:
             The measured motion of the palm in the world, which carries the object (eq. 3.8).
         """
-        motion, table, start = self._motion, self._table(), self.plan.frame
-        targets_N = self.fingers.balanced_forces_N(touching, self.settings.squeeze_force_N)
-        duration_s = max(
-            abs(turn_rad) / self.settings.carry_turn_rad_s,
-            float(np.linalg.norm(shift_world_m)) / self.settings.carry_m_s,
-        )
-
-        def frame_at(share: float) -> GraspFrame:
-            dx, dy = share * shift_world_m
-            return start.move(float(dx), float(dy), share * turn_rad)
-
+        motion, table = self._motion, self._table()
+        targets_N = self.fingers.balanced_forces_N(touching, self.holding_N)
         self.jammed, pressed_cycles = (), 0
 
         def hold() -> bool:
@@ -250,13 +275,17 @@ class GraspCycle:
 
         world_T_before = motion.runtime.perception.world_T_palm
         motion.runtime.begin_hold()
-        share = motion.follow(lambda share: motion.base_joints(frame_at(share), table), duration_s, hold)
+
+        def base_at(share: float) -> Array:
+            return motion.base_joints(self._carried_to(share, turn_rad, shift_world_m), table)
+
+        share = motion.follow(base_at, self._carry_s(turn_rad, shift_world_m), hold)
         if self.jammed:
             self.fingers.build_up(targets_N, self.settings.squeeze_s)
         motion.wait(self.settings.rest_s)
-        self.fingers.ease(touching)
+        self.fingers.ease(touching, self.holding_N)
         motion.runtime.end_hold()
-        self._plan = replace(self.plan, frame=frame_at(share))
+        self._plan = replace(self.plan, frame=self._carried_to(share, turn_rad, shift_world_m))
         return motion.runtime.perception.world_T_palm * world_T_before.inverse()
 
     def weigh(self, touching: frozenset[str]) -> LiftEnd:
@@ -267,7 +296,7 @@ class GraspCycle:
             is_pressed=lambda: bool(self.fingers.pressed(self.settings.pressed_N)),
         )
         end = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
-        self.fingers.ease(touching)
+        self.fingers.ease(touching, self.settings.weighing.squeeze_N)
         self._motion.runtime.end_hold()
         return end
 

@@ -95,14 +95,14 @@ class GraspFingers:
         self.build_up(self.balanced_forces_N(self.touching, self.settings.contact_force_N), self.settings.settle_s)
         self._motion.wait(self.settings.rest_s)
 
-    def ease(self, touching: frozenset[str]) -> None:
+    def ease(self, touching: frozenset[str], from_N: float) -> None:
         """Press less and less, all fingers together, while the object is still felt.
 
         The fingers open at different speeds and leave one after the other: the last ones then push the object.
         """
         s = self.settings
         for share in self._motion.shares(s.ease_s):
-            force_N = s.squeeze_force_N + share * (s.ease_force_N - s.squeeze_force_N)
+            force_N = from_N + share * (s.ease_force_N - from_N)
             self.servo_forces(self.balanced_forces_N(touching, force_N))
             self._motion.tick()
 

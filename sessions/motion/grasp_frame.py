@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from gtsam import Pose3, Rot3
+from gtsam import Pose2, Pose3, Rot3
 
 from drivers.core.contacts import Array
 
@@ -22,6 +22,11 @@ class GraspFrame:
     def pose(self) -> Pose3:
         """``world_T_grasp``."""
         return Pose3(Rot3.Yaw(self.yaw_rad), np.array([self.x_m, self.y_m, 0.0]))
+
+    @property
+    def planar(self) -> Pose2:
+        """The same on the table."""
+        return Pose2(self.x_m, self.y_m, self.yaw_rad)
 
     def move(self, dx_m: float = 0.0, dy_m: float = 0.0, turn_rad: float = 0.0) -> GraspFrame:
         """Shifted along the world's axes and turned about its own origin."""

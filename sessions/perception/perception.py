@@ -23,13 +23,13 @@ from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from sessions.perception.approach_paths import TipSurface, approach_paths
 from sessions.perception.carrying.carry import Carry
 from sessions.perception.carrying.held_object import HeldObject
+from sessions.perception.carrying.net_wrench import upward_N
 from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.perception.hand_odometry import HandOdometry
 from sessions.perception.hand_placement import HandPlacement
 from sessions.perception.instruments import BaseReading, FrameReading, HandReading, SlotFingertip, WrenchFingertip
 from sessions.perception.touch_capture import Capture, Measured, Probed, TouchSelection
-from sessions.perception.weighing.net_wrench import upward_N
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
 from sessions.recording.session_events import EventKind, SessionEvent
@@ -99,8 +99,9 @@ class Perception:
         self._probed = Probed()
         self._carried = HandOdometry()
         felt = self.fingertips if self.settings.odometry == "touch" else {}
-        self._carrying = HeldObject(felt, form.side, self.settings.odometry_scale)
-        self._scales = Scales(self._carrying, form.side, self.settings.joint_sigma_rad)
+        self.held = HeldObject(felt, form.side, self.settings.odometry_scale)
+        """The object since it was grasped."""
+        self._scales = Scales(self.held, form.side, self.settings.joint_sigma_rad)
 
     # --- samples -----------------------------------------------------------------------------------------------
 
@@ -115,8 +116,8 @@ class Perception:
         self.hand_stamp_ns = sample.stamp_ns
         if self._capture is not None:
             self._capture.joints_rad.append(joints_rad)
-        if self._carrying.is_watched and self._placement.ready:
-            self._carrying.on_hand(sample.stamp_ns, joints_rad, self._placement.world_T_forearm)
+        if self.held.is_watched and self._placement.ready:
+            self.held.on_hand(sample.stamp_ns, joints_rad, self._placement.world_T_forearm)
 
     def on_base(self, sample: BaseReading) -> None:
         """Take the positioner's joints."""
@@ -159,7 +160,7 @@ class Perception:
     @property
     def carry(self) -> Carry | None:
         """What the fingertips felt in the last completed hold; None if they felt nothing that tells."""
-        return self._carrying.carry
+        return self.held.carry
 
     @property
     def properties(self) -> ObjectProperties:
@@ -168,7 +169,7 @@ class Perception:
 
     def held_N(self) -> float:
         """Upward force of the fingertips on the object now; 0 where they tell nothing while they move."""
-        return upward_N(self._carrying.fingertips, self._placement.current().world_T_distal[:, :3, :3])
+        return upward_N(self.held.fingertips, self._placement.current().world_T_distal[:, :3, :3])
 
     @property
     def joints_rad(self) -> Array:
@@ -251,7 +252,7 @@ class Perception:
                 return self._tare(event)
             case EventKind.CLOSE_BEGIN:
                 self._closing_start = self._placement.current()
-                self._carrying.on_left()
+                self.held.on_close(event.stamp_ns)
                 return None
             case EventKind.CAPTURE_BEGIN:
                 self._begin_capture(event)
@@ -260,11 +261,11 @@ class Perception:
                 return self._grasp(event)
             case EventKind.TOUCH_END:
                 self._probed.add(self._end_capture(event))
-                self._carrying.on_left()
+                self.held.on_left()
                 return None
             case EventKind.HOLD_BEGIN:
                 self._carried.begin(self.world_T_palm)
-                self._carrying.on_hold(event.stamp_ns)
+                self.held.on_hold(event.stamp_ns)
                 self._probed = Probed()
                 return None
             case EventKind.HOLD_END:
@@ -278,15 +279,15 @@ class Perception:
                 return self._scales.event(event, self.grasp_count - 1)
 
     def _end_hold(self) -> None:
-        carry = self._carrying.end_hold()
+        carry = self.held.end_hold()
         self._carried.end(self.world_T_palm, carry)
         if carry is not None:
-            self.properties.sliding.append((self.grasp_count - 1, carry.sliding))
+            self._scales.on_carry(carry.sliding, self.grasp_count - 1)
 
     def _tare(self, event: SessionEvent) -> TareReport:
         self._placement.latest()
         if set(self.fingertips) <= set(event.fingers):
-            self._carrying.on_left()
+            self.held.on_left()
         self._loads_N = None
         refused = {}
         for finger in event.fingers:
@@ -304,14 +305,14 @@ class Perception:
             fingertip.begin_capture()
         self._capture = Capture(event.stamp_ns)
         if not self.is_holding:
-            self._carrying.on_capture(event.stamp_ns)
+            self.held.on_capture(event.stamp_ns)
 
     def _grasp(self, event: SessionEvent) -> Grasp:
         measured, probed = self._end_capture(event), self._probed
         self._probed = Probed()
-        felt = self._carrying.end_hold(measured.stamp_ns) if self.is_holding else None
+        felt = self.held.end_hold(measured.stamp_ns) if self.is_holding else None
         index, motion = self.grasp_count, self._carried.take(self.world_T_palm, felt)
-        self._carrying.on_grasp(measured)
+        self.held.on_grasp(measured)
         return Grasp(
             index=index,
             stamp_ns=measured.stamp_ns,
@@ -319,7 +320,7 @@ class Perception:
             world_T_palm=Pose3(measured.world_T_palm),
             hand_motion_world=motion.world if index else Pose3(),
             approach_paths=(*measured.ways, *probed.ways),
-            motion_sigma=motion.sigma if index else None,
+            motion_sigma=self.held.then_closed(motion.sigma) if index else None,
         )
 
     def _end_capture(self, event: SessionEvent) -> Measured:
@@ -352,5 +353,5 @@ class Perception:
     def _undo(self) -> Undone:
         self._carried.undo()
         self._capture = None
-        self.properties.undo(self.grasp_count)
+        self._scales.undo(self.grasp_count)
         return Undone(self.grasp_count)

@@ -59,9 +59,9 @@ def autonomous_roles(
     guard = InterruptGuard()
     decisions = PolicyDecisions(client, record_choices(runtime), approve, guard)
     if not settings.probing.is_wanted:
-        return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, guard=guard)
+        return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.foretell, guard=guard)
     prober = BoxProber(Toucher(motion, settings.cycle, hand), settings.probing, window, settings.plan.start_m)
-    return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, prober.feel, guard)
+    return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.foretell, prober.feel, guard)
 
 
 def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, seed: int, dimension: int) -> Planner:

@@ -8,6 +8,7 @@ from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.studies import (
     ablation,
+    carrying,
     consistency,
     everyday,
     exploration,
@@ -50,6 +51,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         exploration.EXPLORATION_KINEMATIC,
         everyday.EVERYDAY_OBJECTS,
         everyday.HANDS,
+        carrying.CARRIES,
+        carrying.WEIGHING,
         laboratory.CAMERA_TRUTH,
         laboratory.GRAPH_STRESS,
         laboratory.CALIBRATE_FOREARM,

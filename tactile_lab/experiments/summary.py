@@ -25,7 +25,18 @@ LEAST_PAIRS, _DRAWS = 20, 2000
 """Smallest number of pairs for the interval of a ratio, and the number of bootstrap samples."""
 
 Kind: TypeAlias = Literal[
-    "spread", "mean", "estimate", "median", "pooled", "percent", "sum", "correlation", "paired", "shares"
+    "spread",
+    "mean",
+    "estimate",
+    "median",
+    "pooled",
+    "rms",
+    "within",
+    "percent",
+    "sum",
+    "correlation",
+    "paired",
+    "shares",
 ]
 
 
@@ -38,7 +49,8 @@ class Column:
         key: name of the figure in a row.
         digits: number of decimals.
         kind: "spread" gives median / p90 / maximum, "median" the median, "mean" the mean, "pooled" median / p95 of all
-            numbers in the lists of all runs, "percent" the mean of shares or flags, "sum" the total, "estimate" the
+            numbers in the lists of all runs, "rms" their root mean square, "within" how many of them are at most 1, 2
+            and 3, in per cent, "percent" the mean of shares or flags, "sum" the total, "estimate" the
             mean with its standard error, "correlation" Pearson's of all pairs in the lists of all runs, "paired" the
             mean difference to the same runs with nothing left out, with its bootstrap 95 % interval, "shares" the mean
             of each share in the lists of all runs.
@@ -225,6 +237,17 @@ def _pool(group: Group, column: Column) -> str:
     return " / ".join(number(quantile(values, share), column.digits) for share in (0.5, 0.95)) if values else UNKNOWN
 
 
+def _rms(group: Group, column: Column) -> str:
+    values = group.pool(column.key)
+    return number(math.sqrt(sum(value**2 for value in values) / len(values)), column.digits) if values else UNKNOWN
+
+
+def _within(group: Group, column: Column) -> str:
+    values = group.pool(column.key)
+    shares = [sum(abs(value) <= limit for value in values) / len(values) for limit in (1, 2, 3)] if values else []
+    return " / ".join(f"{100 * share:.{column.digits}f}" for share in shares) or UNKNOWN
+
+
 def _estimate(group: Group, column: Column) -> str:
     values = group.values(column.key)
     mean, count = sum(values) / len(values), len(values)
@@ -274,6 +297,8 @@ _SHOWN: Mapping[Kind, Callable[[Group, Column], str]] = {
     "correlation": _correlation,
     "median": lambda group, column: number(group.spread(column.key).median, column.digits),
     "pooled": _pool,
+    "rms": _rms,
+    "within": _within,
     "percent": _percent,
     "sum": _sum,
     "shares": _shares,
@@ -303,8 +328,8 @@ def _figure_json(group: Group, column: Column) -> Any:
         return {**group.spread(column.key).as_json(), "text": _estimate(group, column)}
     if column.kind == "paired":
         return [_of(row, column) for row in group.rows]
-    if column.kind == "shares":
-        return {"text": _shares(group, column)}
+    if column.kind in ("shares", "rms", "within"):
+        return {"text": _SHOWN[column.kind](group, column)}
     if column.kind != "pooled":
         return group.spread(column.key).as_json()
     values = group.pool(column.key)

@@ -12,15 +12,13 @@ from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
-from sessions.perception.carrying.friction_balance import Balance, Friction, compose_steps
+from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
+from sessions.perception.carrying.planar_motions import displacement, planar_matrices
+from sessions.perception.carrying.tilt import tilt_rad
 from sessions.perception.carrying.tip_steps import TipSteps, tip_steps
 
 _ITERATIONS, _ITERATIONS_OF_OTHERS = 12, 4
-_FOOT_SHARE = 0.6
-"""Radius at which the table's friction acts against a turn, as a share of the foot's: 2/3 for a disc that presses
-evenly, less where the middle carries more.
-"""
-_LEAST_FOOT_m, _LARGEST_FOOT_m = 0.01, 0.05
+_LEAST_HALF_WIDTH_m, _LARGEST_HALF_WIDTH_m = 0.017, 0.083
 _FAR_m, _FAR_rad = 0.004, float(np.deg2rad(5.0))
 """A slip that a person should hear of: more than half of the rigs' usual ones."""
 _RESISTED_SHARES = (0.2, 0.6)
@@ -45,6 +43,7 @@ class CarryNoise:
         let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
+        closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
@@ -58,6 +57,8 @@ class CarryNoise:
     let_go_rad_N: float = float(np.deg2rad(0.12))
     pushed_m_N: float = 0.00175
     pushed_rad_N: float = float(np.deg2rad(1.0))
+    closed_m_N: float = 0.006
+    closed_rad_N: float = float(np.deg2rad(2.0))
     unseen: float = 0.5
 
 
@@ -72,6 +73,7 @@ class Carry:
         loose_s: how long no fingertip touched the object.
         single_s: how long only one did.
         resisted_N: force with which the object resisted, beyond what a table's friction explains; 0 if it did not.
+        tilted_rad: how far it leaned at the end; 0 if it stood.
         void: fingertips without valid readings for a while.
         sliding: ratio of tangential to normal force at contacts that slid, shape (n,).
     """
@@ -84,6 +86,7 @@ class Carry:
     single_s: float
     resisted_N: float
     void: tuple[str, ...]
+    tilted_rad: float = 0.0
     sliding: Array = field(default_factory=lambda: np.zeros(0))
 
     def in_words(self) -> str:
@@ -104,6 +107,8 @@ class Carry:
             found.append(f"held by one fingertip for {self.single_s:.1f} s")
         if self.loose_s > _NO_HOLD_s:
             found.append(f"touched by no fingertip for {self.loose_s:.1f} s")
+        if self.tilted_rad:
+            found.append(f"the object leans by {np.degrees(self.tilted_rad):.0f} degrees: has it fallen over?")
         if self.resisted_N:
             found.append(f"the object resisted with {self.resisted_N:.1f} N: is it jammed, or held by something?")
         return tuple(found)
@@ -122,6 +127,8 @@ class CarryOdometry:
         self._fingertips, self._side, self._scale = fingertips, side, scale
         self._spans_m: list[float] = []
         self.noise = CarryNoise()
+        self.measured = MeasuredFriction()
+        """What was measured of the object's friction by dragging it, or in earlier carries."""
 
     def on_grasp(self, contacts: Sequence[Contact]) -> None:
         """Contacts of a grasp: they show the size of the object's foot."""
@@ -131,10 +138,23 @@ class CarryOdometry:
             self._spans_m.append(float(np.linalg.norm(gaps, axis=-1).max()))
 
     @property
-    def foot_m(self) -> float:
-        """Radius at which the table's friction acts against a turn."""
+    def friction(self) -> Friction:
+        """What is assumed of the object: what was measured, and what is usual of the rest."""
         half_m = np.mean(self._spans_m) / 2 if self._spans_m else 0.05
-        return float(np.clip(_FOOT_SHARE * half_m, _LEAST_FOOT_m, _LARGEST_FOOT_m))
+        half_width_m = float(np.clip(half_m, _LEAST_HALF_WIDTH_m, _LARGEST_HALF_WIDTH_m))
+        return self.measured.known(Friction(half_width_m=half_width_m))
+
+    def closed(self, sigma: StepSigma, closing_N: float) -> StepSigma:
+        """How well the object's place is known once the hand has closed again.
+
+        Args:
+            sigma: before.
+            closing_N: largest net force of the fingertips meanwhile.
+        """
+        excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
+        translation_m = np.hypot(sigma.translation_m, self._scale * noise.closed_m_N * excess_N)
+        rotation_rad = np.hypot(sigma.rotation_rad, self._scale * noise.closed_rad_N * excess_N)
+        return StepSigma(float(translation_m), float(rotation_rad))
 
     def estimate(self, samples: CarrySamples) -> Carry:
         """The carry by these samples."""
@@ -142,26 +162,34 @@ class CarryOdometry:
 
     def carry(self, steps: TipSteps) -> Carry:
         """The carry that these steps make; deterministic."""
-        balance, usual = Balance.of(steps), Friction(foot_m=self.foot_m)
+        balance, usual = Balance.of(steps), self.friction
         best = balance.solve([usual], _ITERATIONS)[0]
-        others = balance.solve(_other_assumptions(usual), _ITERATIONS_OF_OTHERS, best)
+        others = balance.solve(_other_assumptions(usual, self.measured), _ITERATIONS_OF_OTHERS, best)
         motions = compose_steps(np.concatenate([best[None], others]), balance.centres_m)
-        palm = _planar_motions(steps.world_T_palm[[0, -1]])[0]
+        palm = planar_matrices(steps.world_T_palm[[0, -1]])[0]
         middle = balance.centres_m[0]
-        ends = np.array([_displacement(motion, middle) for motion in motions])
-        slip = _displacement(np.linalg.inv(palm) @ motions[0], middle)
+        ends = np.array([displacement(motion, middle) for motion in motions])
+        slip = displacement(np.linalg.inv(palm) @ motions[0], middle)
         loose_s, single_s = (float(steps.step_s @ (steps.felt.sum(axis=1) == count)) for count in (0, 1))
+        tilted_rad = tilt_rad(steps)
         void_s = steps.step_s @ (steps.is_void & [finger in self._fingertips for finger in FINGERS])
         return Carry(
             motion=_pose(motions[0]),
-            sigma=self._sigma(ends.std(axis=0), slip, steps, _unseen(steps, balance.centres_m, self._fingertips)),
+            sigma=self._sigma(ends.std(axis=0), slip, steps, self._unseen(steps, balance.centres_m, tilted_rad)),
             slip_m=float(np.hypot(*slip[:2])),
             slip_rad=float(abs(slip[2])),
             loose_s=loose_s,
             single_s=single_s,
             resisted_N=_resisted_N(steps),
+            tilted_rad=tilted_rad,
             void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
             sliding=_sliding_ratios(steps, balance.sliding_m(best)),
+        )
+
+    def _unseen(self, steps: TipSteps, centres_m: Array, tilted_rad: float) -> Array:
+        """Motion that was not seen, metres and radians: of the hand in doubtful steps, and of what tips over."""
+        return _unseen(steps, centres_m, self._fingertips) + tilted_rad * np.array(
+            [2 * self.friction.half_width_m, 1.0]
         )
 
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, unseen: Array) -> StepSigma:
@@ -181,14 +209,14 @@ class CarryOdometry:
         return StepSigma(float(scaled[0]), float(scaled[1]))
 
 
-def _other_assumptions(usual: Friction) -> Sequence[Friction]:
+def _other_assumptions(usual: Friction, measured: MeasuredFriction) -> Sequence[Friction]:
     """Others that cannot be excluded; what they change is what is not known."""
     return (
-        replace(usual, tips=0.3),
-        replace(usual, tips=1.0),
-        replace(usual, foot_m=usual.foot_m / 1.5),
-        replace(usual, foot_m=1.5 * usual.foot_m),
-        replace(usual, table_N=0.0),
+        replace(usual, tips=max(0.3, measured.tips_at_least)),
+        replace(usual, tips=max(1.0, usual.tips)),
+        replace(usual, half_width_m=usual.half_width_m / 1.5),
+        replace(usual, half_width_m=1.5 * usual.half_width_m),
+        replace(usual, table_N=measured.least_table_N),
         replace(usual, normal_weight=usual.normal_weight / 5),
         replace(usual, give_m=0.0),
         replace(usual, give_m=2 * usual.give_m),
@@ -227,27 +255,10 @@ def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, Continuo
     wired = [finger in fingertips for finger in FINGERS]
     poorly = (steps.felt.sum(axis=1) < 2) | (steps.is_void & wired).any(axis=1)
     doubt = np.maximum(poorly, _resistance(steps))
-    moves = _planar_motions(steps.world_T_palm)
+    moves = planar_matrices(steps.world_T_palm)
     shifts = np.einsum("nij,nj->ni", moves[:, :2, :2], centres_m) + moves[:, :2, 2] - centres_m
     turns = np.abs(np.arctan2(moves[:, 1, 0], moves[:, 0, 0]))
     return np.array([np.linalg.norm(shifts, axis=1) @ doubt, turns @ doubt])
-
-
-def _planar_motions(frames: Array) -> Array:
-    """Motions from each of n frames, shape (n, 4, 4), to the next, on the table: shape (n - 1, 3, 3)."""
-    moves = frames[1:] @ np.linalg.inv(frames[:-1])
-    turns = np.arctan2(moves[:, 1, 0] - moves[:, 0, 1], moves[:, 0, 0] + moves[:, 1, 1])
-    planar = np.tile(np.eye(3), (len(moves), 1, 1))
-    planar[:, 0, 0] = planar[:, 1, 1] = np.cos(turns)
-    planar[:, 1, 0], planar[:, 0, 1] = np.sin(turns), -np.sin(turns)
-    planar[:, :2, 2] = moves[:, :2, 3]
-    return planar
-
-
-def _displacement(motion: Array, middle_m: Array) -> Array:
-    """Displacement of a point by a planar motion, and the motion's angle, shape (3,)."""
-    moved = motion[:2, :2] @ middle_m + motion[:2, 2] - middle_m
-    return np.array([*moved, np.arctan2(motion[1, 0], motion[0, 0])])
 
 
 def _pose(motion: Array) -> Pose2:

@@ -17,7 +17,7 @@ fingertips' motion suffice. Without a contact the object stays where it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,12 @@ _LEAST_WEIGHT = np.diag([1e-3, 1e-3, 1e-6])
 """Keeps a step determined in which nothing holds the object, not even the table."""
 
 
+_FOOT_SHARE = 0.6
+"""Radius at which the table's friction acts against a turn, as a share of the foot's: 2/3 for a disc that presses
+evenly, less where the middle carries more.
+"""
+
+
 @dataclass(frozen=True)
 class Friction:
     """What the balance assumes.
@@ -39,7 +45,7 @@ class Friction:
     Attributes:
         tips: coefficient of friction at the fingertips.
         table_N: force of friction of the table on the object: its weight times the coefficient.
-        foot_m: radius at which the table's friction acts against a turn, about 0.6 of the foot's radius.
+        half_width_m: radius of the object's foot.
         normal_weight: w, 1/m; how hard the normals are.
         give_m: how much deeper a fingertip sinks in when its force grows e-fold; its joints move by so much, and the
             object does not. Links that bend under the force do the same.
@@ -47,9 +53,45 @@ class Friction:
 
     tips: float = 0.6
     table_N: float = 1.0
-    foot_m: float = 0.03
+    half_width_m: float = 0.05
     normal_weight: float = 5e5
     give_m: float = 0.0003
+
+    @property
+    def foot_m(self) -> float:
+        """Radius at which the table's friction acts against a turn."""
+        return _FOOT_SHARE * self.half_width_m
+
+
+@dataclass(frozen=True)
+class MeasuredFriction:
+    """What is known of an object's friction; nothing to begin with.
+
+    Attributes:
+        table_N, table_sigma_N: force of friction of the table, and its standard deviation; None if it was not dragged.
+        tips_at_least: what the fingertips' coefficient of friction is at least.
+        weight_N: of the object; NaN if it was not lifted.
+    """
+
+    table_N: float | None = None
+    table_sigma_N: float = 0.0
+    tips_at_least: float = 0.0
+    weight_N: float = float("nan")
+
+    def known(self, usual: Friction) -> Friction:
+        """The usual assumptions, with what was measured in their place."""
+        table_N = usual.table_N if self.table_N is None else self.table_N
+        return replace(usual, table_N=table_N, tips=max(usual.tips, self.tips_at_least))
+
+    @property
+    def least_table_N(self) -> float:
+        """The least friction of the table that cannot be excluded."""
+        return 0.0 if self.table_N is None else max(0.0, self.table_N - 2 * self.table_sigma_N)
+
+    @property
+    def most_table_N(self) -> float | None:
+        """The most, two standard deviations above what was measured; None if nothing was."""
+        return None if self.table_N is None else self.table_N + 2 * self.table_sigma_N
 
 
 @dataclass(frozen=True)

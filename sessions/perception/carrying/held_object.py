@@ -6,11 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from drivers.core.fingertip import ContinuousFingertip, FingertipSensor
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry import Carry, CarryOdometry
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
+from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.touch_capture import Measured
 
 
@@ -28,12 +29,23 @@ class HeldObject:
 
     def __init__(self, fingertips: Mapping[str, FingertipSensor], side: Side, scale: float = 1.0) -> None:
         self.fingertips = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
-        self._record, self._odometry = CarryRecord(self.fingertips), CarryOdometry(self.fingertips, side, scale)
-        self._from_ns = 0
+        self._record = CarryRecord(self.fingertips)
+        self.odometry = CarryOdometry(self.fingertips, side, scale)
+        """Estimates the carries."""
+
+        self._from_ns, self._side = 0, side
+        self.closing_N = 0.0
+        """Largest net force of the fingertips along the table while the hand closed for the last capture.
+
+        What they feel balances itself, but for what moves the object, and for links on its other side.
+        """
+
         self.contact_height_m = 0.0
         """Mean height of the last capture's contacts above the table."""
         self.carry: Carry | None = None
         """The last completed one; None if the fingertips measured nothing."""
+        self.samples: CarrySamples | None = None
+        """What hand and fingertips measured in it."""
 
     @property
     def is_watched(self) -> bool:
@@ -44,8 +56,15 @@ class HeldObject:
         """Joint angles, shape (24,), and the forearm's pose, shape (4, 4)."""
         self._record.take(stamp_ns, joints_rad, world_T_forearm)
 
+    def on_close(self, stamp_ns: int) -> None:
+        """The fingers begin to close; the object may be pushed."""
+        self._from_ns = stamp_ns
+        self._record.begin()
+
     def on_capture(self, stamp_ns: int) -> None:
         """The fingers have closed and rest: whatever moves the object from now on counts."""
+        closing = self._record.since(self._from_ns) if self._record.is_open else None
+        self.closing_N = 0.0 if closing is None else largest_net_N(closing, self.fingertips, self._side)
         self._from_ns = stamp_ns
         self._record.begin()
 
@@ -54,7 +73,7 @@ class HeldObject:
         self._from_ns = measured.stamp_ns
         if measured.contacts:
             self.contact_height_m = float(np.mean([contact.point_world_m[2] for contact in measured.contacts]))
-        self._odometry.on_grasp(measured.contacts)
+        self.odometry.on_grasp(measured.contacts)
 
     def on_hold(self, stamp_ns: int) -> None:
         """The hand begins to carry the object."""
@@ -73,12 +92,16 @@ class HeldObject:
         """The carry from the capture until a moment since; None if the fingertips measured nothing."""
         samples = self._record.since(self._from_ns)
         samples = None if samples is None else samples.until(stamp_ns)
-        return None if samples is None else self._odometry.estimate(samples)
+        return None if samples is None else self.odometry.estimate(samples)
+
+    def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
+        """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
+        return None if sigma is None else self.odometry.closed(sigma, self.closing_N)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
         """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""
-        samples = self._record.since(self._from_ns)
-        self.carry = None if samples is None else self._odometry.estimate(samples)
+        samples = self.samples = self._record.since(self._from_ns)
+        self.carry = None if samples is None else self.odometry.estimate(samples)
         if until_ns is None:
             self._record.end()
         return self.carry

@@ -9,6 +9,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.fingertip import GRAVITY
+from sessions.perception.carrying.friction_balance import MeasuredFriction
 from sessions.perception.weighing.weighing import Dragging, Hanging
 
 _LEAST_SLIDING = 40
@@ -117,6 +118,19 @@ class ObjectProperties:
         """
         ratios = np.concatenate([np.zeros(0), *(each for _, each in self.sliding)])
         return float(np.quantile(ratios, _SLIDING_SHARE)) if len(ratios) >= _LEAST_SLIDING else None
+
+    @property
+    def friction(self) -> MeasuredFriction:
+        """What odometry, and whoever squeezes the object, need to know; nothing before it was dragged."""
+        table, mass = self.table_friction_N, self.mass_kg
+        if table is None:
+            return MeasuredFriction()
+        return MeasuredFriction(
+            table_N=table.value,
+            table_sigma_N=table.sigma,
+            tips_at_least=self.tip_friction_at_least or 0.0,
+            weight_N=float("nan") if mass is None else GRAVITY * mass.value,
+        )
 
     @property
     def _free(self) -> list[tuple[int, Hanging]]:

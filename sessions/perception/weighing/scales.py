@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from drivers.core.contacts import Array
 from drivers.core.errors import SessionError
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.held_object import HeldObject
@@ -41,12 +42,27 @@ class Scales:
         self._from_ns = event.stamp_ns
         return None
 
+    def undo(self, grasp_index: int) -> None:
+        """Forget what was measured after a grasp that does not count."""
+        self.properties.undo(grasp_index)
+        self._tell_odometry()
+
+    def _tell_odometry(self) -> None:
+        """Later carries of the object are followed with what is known of it now."""
+        self._held.odometry.measured = self.properties.friction
+
+    def on_carry(self, sliding: Array, grasp_index: int) -> None:
+        """Hear the force ratios at the contacts that slid in a carry."""
+        self.properties.sliding.append((grasp_index, sliding))
+        self._tell_odometry()
+
     def _end_dragging(self, grasp_index: int) -> Dragging | None:
         samples = self._held.samples_since(self._begun_ns())
         if samples is None:
             return None
         found = dragging(samples, self._held.fingertips, self._side)
         self.properties.draggings.append((grasp_index, found))
+        self._tell_odometry()
         return found
 
     def _end_hanging(self, grasp_index: int) -> Hanging | None:
@@ -60,6 +76,7 @@ class Scales:
             sigma_m = np.hypot(found.centre_sigma_m, carried.sigma.translation_m)
             found = replace(found, centre_m=back, centre_sigma_m=sigma_m)
         self.properties.hangings.append((grasp_index, found))
+        self._tell_odometry()
         return found
 
     def _begun_ns(self) -> int:

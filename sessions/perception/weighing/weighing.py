@@ -12,7 +12,7 @@ from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.model.kinematics import JOINTS
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
-from sessions.perception.weighing.net_wrench import NetWrench, net_wrench
+from sessions.perception.carrying.net_wrench import NetWrench, net_wrench
 
 _GAIN = 0.01
 """Error of a force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""

@@ -55,6 +55,8 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "hands": ({"rig": ["sim-lite"]}, 1),
+    "carries": ({"object": ["cube-6"], "mass_kg": ["0.3"]}, 2),
+    "weighing": ({"object": ["cube-6"], "mass_kg": ["0.3"]}, 1),
     "everyday-objects": ({"object": ["cube-6"], "dimension": ["2"]}, 1),
     "camera-truth": ({"condition": ["sharp"]}, None),
     "calibrate-forearm": ({"method": ["touch"], "poses": ["20"]}, None),
@@ -67,6 +69,8 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
 # Whole sessions on the simulated rig, and whole surfaces.
 LENGTHY = (
     "ablation",
+    "carries",
+    "weighing",
     "figure-3.12",
     "known-shape",
     "methods-3d",

@@ -152,7 +152,7 @@ def test_two_assumptions_that_differ_widen_the_noise():
 def test_the_foot_is_as_large_as_the_contacts_are_apart():
     small, large = odometry(), odometry()
     small._spans_m, large._spans_m = [0.02], [0.12]
-    assert small.foot_m < odometry().foot_m < large.foot_m
+    assert small.friction.foot_m < odometry().friction.foot_m < large.friction.foot_m
 
 
 @pytest.mark.parametrize("count", [1, 2, 7, 64])

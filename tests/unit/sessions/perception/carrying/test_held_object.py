@@ -148,3 +148,21 @@ def test_an_undone_grasp_returns_its_motion_and_how_well_that_is_known():
     odometry.take(PALM)
     odometry.undo()
     assert odometry.take(PALM).sigma == FELT.sigma
+
+
+def test_what_the_fingertips_push_while_the_hand_closes_makes_the_place_less_certain():
+    """All five fingertips push, 1 N each, more or less the same way, and nothing pushes back."""
+    watched, before = held(), StepSigma(0.001, 0.01)
+    watched.on_close(0)
+    carry_by(watched, 0.0)
+    watched.on_capture(60 * CYCLE_ns)
+    assert 3.5 < watched.closing_N < 5.0
+    assert watched.then_closed(before).translation_m > 0.01
+    assert watched.then_closed(None) is None
+
+
+def test_a_closing_whose_forces_balance_leaves_the_noise_as_it_was():
+    watched, before = held(), StepSigma(0.001, 0.01)
+    watched.on_close(0)
+    watched.on_capture(60 * CYCLE_ns)
+    assert watched.then_closed(before) == before

@@ -13,7 +13,7 @@ from drivers.core.fingertip import GRAVITY
 from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm_matrix, palm_T_distal_matrices
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.held_object import HeldObject
-from sessions.perception.weighing.net_wrench import upward_N
+from sessions.perception.carrying.net_wrench import upward_N
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
 from sessions.perception.weighing.weighing import Dragging, dragging, hanging
@@ -138,6 +138,18 @@ def test_an_undone_grasp_takes_along_what_was_weighed_in_it():
     assert found.mass_kg is None
     assert found.table_friction_N.value == pytest.approx(1.05)
     assert found.tip_friction_at_least is None
+
+
+def test_odometry_learns_what_was_measured_and_forgets_what_was_undone():
+    watched = HeldObject({}, "right")
+    scales = Scales(watched, "right", JOINT_SIGMA_rad)
+    scales.properties.draggings.append((0, Dragging(0.5, 0.05, 0.06)))
+    scales.on_carry(np.linspace(0.5, 0.9, 100), 0)
+    assert watched.odometry.friction.table_N == 0.5
+    assert watched.odometry.friction.tips == pytest.approx(0.86, abs=0.01)
+    scales.undo(0)
+    assert watched.odometry.measured == ObjectProperties().friction
+    assert watched.odometry.friction.table_N == HeldObject({}, "right").odometry.friction.table_N
 
 
 def test_an_end_without_a_beginning_is_refused():

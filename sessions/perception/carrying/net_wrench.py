@@ -6,12 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from drivers.core.contacts import FINGERS, Array
 from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix, palm_T_distal_matrices
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
+
+_SMOOTHING = 2.0
+"""Samples."""
 
 
 def upward_N(fingertips: Mapping[str, ContinuousFingertip], world_R_distal: Array) -> float:
@@ -69,3 +73,11 @@ def net_wrench(
         moment_Nm += np.cross(frames[:, at, :3, 3] - palm_m, force)
         moment_Nm -= np.einsum("nij,nj->ni", rotations, felt[:, 3:])
     return NetWrench(force_N, moment_Nm, palm_m)
+
+
+def largest_net_N(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> float:
+    """Largest force of all fingertips together along the table, smoothed over 20 ms."""
+    along_N = gaussian_filter1d(
+        net_wrench(samples, fingertips, side).force_N[:, :2], _SMOOTHING, axis=0, mode="nearest"
+    )
+    return float(np.linalg.norm(along_N, axis=1).max())

@@ -1,0 +1,95 @@
+"""Carries a captured object: weighs it, foretells what will become of it, re-orients it, and tells how it slipped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from gtsam import Pose3
+
+from drivers.core.contacts import Grasp
+from sessions.conductor.decisions import SessionRoles
+from sessions.conductor.estimator import Reorientation
+from sessions.motion.grasp_plan import holds
+from sessions.recording.recorder import Level
+from sessions.rig_runtime.rig_runtime import RigRuntime
+
+Tell = Callable[[Level, str], None]
+
+
+class Carrier:
+    """Executes what follows a capture, until the hand opens.
+
+    Args:
+        runtime: connected.
+        roles: perform, and decide.
+        phase: hears each step.
+        tell: hears what a person should know.
+    """
+
+    def __init__(self, runtime: RigRuntime, roles: SessionRoles, phase: Callable[[str], None], tell: Tell) -> None:
+        self._runtime, self._roles, self._phase, self._tell = runtime, roles, phase, tell
+
+    def carry(self, grasp: Grasp, wanted: Reorientation, *, weighed: bool, last: bool) -> None:
+        """Squeeze, and re-orient the object, unless it stays in place or too few fingers hold it.
+
+        Args:
+            grasp: as captured.
+            wanted: how to re-orient it.
+            weighed: whether it is to be weighed before.
+            last: no grasp follows.
+        """
+        self._roles.supervisor.count_contacts(len(grasp.contacts))
+        hand_motion = Pose3()
+        if weighed and holds(grasp.touching):
+            self._weigh(grasp.touching)
+            hand_motion = self._told_carry() or hand_motion
+        if wanted.moves and holds(grasp.touching) and not last:
+            hand_motion = self._reorient(grasp, wanted)
+        self._roles.decisions.on_carry(hand_motion)
+
+    def _reorient(self, grasp: Grasp, wanted: Reorientation) -> Pose3:
+        """The object's motion since the capture."""
+        cycle = self._roles.performer
+        self._foretell(grasp, wanted)
+        self._phase("squeeze")
+        cycle.squeeze(grasp.touching)
+        self._phase("re-orient")
+        palm_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, grasp.touching)
+        if cycle.jammed:
+            self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: re-orientation stopped early")
+        return self._told_carry() or palm_motion
+
+    def _foretell(self, grasp: Grasp, wanted: Reorientation) -> None:
+        """Hold the object as hard as it needs, and say what is to be expected."""
+        if self._roles.foretell is None:
+            return
+        forecast = self._roles.foretell(grasp, wanted.turn_rad, wanted.shift_world_m)
+        if forecast is None:
+            return
+        self._runtime.log(Level.INFO, "odometry", f"each finger holds the object with {forecast.force_N:.2f} N")
+        if words := forecast.in_words():
+            self._tell(Level.WARNING, f"the object {words}")
+
+    def _weigh(self, touching: frozenset[str]) -> None:
+        """Weigh the held object, if this session can and nobody objects."""
+        roles = self._roles
+        if roles.weigh is None:
+            return
+        if not roles.decisions.may_weigh(roles.performer.plan):
+            self._tell(Level.INFO, "the object is not weighed")
+            return
+        self._phase("weigh")
+        end = roles.weigh(touching)
+        self._tell(Level.INFO, f"weighed: {end}; {self._runtime.perception.properties.in_words()}")
+
+    def _told_carry(self) -> Pose3 | None:
+        """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""
+        perception = self._runtime.perception
+        if (carry := perception.carry) is None:
+            return None
+        level, words = Level.WARNING if carry.is_remarkable else Level.INFO, f"the object {carry.in_words()}"
+        if carry.is_remarkable:
+            self._tell(level, words)
+        else:
+            self._runtime.log(level, "odometry", words)
+        return perception.hand_motion_world

@@ -1,0 +1,24 @@
+"""Motions on the table as homogeneous matrices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.core.contacts import Array
+
+
+def planar_matrices(frames: Array) -> Array:
+    """Motions from each of n frames, shape (n, 4, 4), to the next, on the table: shape (n - 1, 3, 3)."""
+    moves = frames[1:] @ np.linalg.inv(frames[:-1])
+    turns = np.arctan2(moves[:, 1, 0] - moves[:, 0, 1], moves[:, 0, 0] + moves[:, 1, 1])
+    planar = np.tile(np.eye(3), (len(moves), 1, 1))
+    planar[:, 0, 0] = planar[:, 1, 1] = np.cos(turns)
+    planar[:, 1, 0], planar[:, 0, 1] = np.sin(turns), -np.sin(turns)
+    planar[:, :2, 2] = moves[:, :2, 3]
+    return planar
+
+
+def displacement(motion: Array, middle_m: Array) -> Array:
+    """Displacement of a point by a planar motion, and the motion's angle, shape (3,)."""
+    moved = motion[:2, :2] @ middle_m + motion[:2, 2] - middle_m
+    return np.array([*moved, np.arctan2(motion[1, 0], motion[0, 0])])

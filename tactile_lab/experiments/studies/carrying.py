@@ -1,0 +1,74 @@
+"""What the hand feels while it moves things: how carried objects slip, and what held ones weigh."""
+
+from __future__ import annotations
+
+from drivers.simulation.objects import CATALOGUE
+from tactile_lab.experiments.cells import Setting, grid
+from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.runs.carried_objects import MASS_kg, carry_object
+from tactile_lab.experiments.runs.weighed_objects import weigh_object
+from tactile_lab.experiments.studies.plots import ranges
+from tactile_lab.experiments.summary import Column
+
+_OTHER_MASSES_kg = (0.05, 1.0, 2.0)
+_WEIGHED_MASSES_kg = (0.1, 0.2, 0.3, 0.4)
+
+
+def _carried(grasps: int) -> list[Setting]:
+    """Every object as it is usual, and a box of other masses, which is first weighed or not."""
+    return [
+        *grid(object=list(CATALOGUE), mass_kg=[MASS_kg], weighed=[0], grasps=[grasps]),
+        *grid(object=["box-10x6x4"], mass_kg=list(_OTHER_MASSES_kg), weighed=[0, 1], grasps=[grasps]),
+    ]
+
+
+CARRIES = Experiment(
+    "carries",
+    "Carried objects: how they slipped, and how far off odometry in the hand is, as measured and with a worse hand.",
+    _carried,
+    carry_object,
+    (
+        Column("carries", "carries", 0, kind="sum"),
+        Column("foretold to slip", "foretold", 0, kind="sum"),
+        Column("slipped, mm: median / p95", "palm_carry_mm", 2, kind="pooled"),
+        Column("°", "palm_carry_deg", 1, kind="pooled"),
+        Column("odometry off, mm", "as_measured_carry_mm", 2, kind="pooled"),
+        Column("°", "as_measured_carry_deg", 2, kind="pooled"),
+        Column("worse hand, mm", "all_of_these_carry_mm", 2, kind="pooled"),
+        Column("°", "all_of_these_carry_deg", 2, kind="pooled"),
+        Column("gains, mm", "joint_gains_carry_mm", 2, kind="pooled"),
+        Column("play, mm", "play_carry_mm", 2, kind="pooled"),
+        Column("bending, mm", "bending_carry_mm", 2, kind="pooled"),
+        Column("crosstalk, mm", "crosstalk_carry_mm", 2, kind="pooled"),
+        Column("late forces, mm", "late_forces_carry_mm", 2, kind="pooled"),
+        Column("palm, next capture, mm rms", "palm_step_axis_mm", 2, kind="rms"),
+        Column("° rms", "palm_step_deg", 2, kind="rms"),
+        Column("odometry, next capture, mm rms", "as_measured_step_axis_mm", 2, kind="rms"),
+        Column("° rms", "as_measured_step_deg", 2, kind="rms"),
+        Column("within 1 / 2 / 3 sigma, mm", "as_measured_z_mm", 0, kind="within"),
+        Column("°", "as_measured_z_deg", 0, kind="within"),
+    ),
+    ranges("object", "odometry off at the next capture, mm", "worst_step_mm", lambda cell: f"{cell['mass_kg']} kg"),
+    pooled=("object",),
+    grasps=5,
+)
+
+WEIGHING = Experiment(
+    "weighing",
+    "Held objects that are dragged, lifted and set down: mass, centre and friction against the truth.",
+    lambda grasps: grid(object=list(CATALOGUE), mass_kg=list(_WEIGHED_MASSES_kg), grasps=[grasps]),
+    weigh_object,
+    (
+        Column("weighed", "weighed", 0, kind="percent"),
+        Column("mass off, %: median / p95", "mass_off", 1, kind="pooled"),
+        Column("within 1 / 2 / 3 sigma", "mass_z", 0, kind="within"),
+        Column("centre off, mm", "centre_off_mm", 1, kind="pooled"),
+        Column("within", "centre_z", 0, kind="within"),
+        Column("table's friction off", "table_off", 3, kind="pooled"),
+        Column("within", "table_z", 0, kind="within"),
+        Column("fingertips' friction at least", "tips_at_least", 2, kind="pooled"),
+    ),
+    ranges("object", "mass off, %", "worst_mass_off", lambda cell: f"{cell['mass_kg']} kg"),
+    pooled=("object",),
+    grasps=1,
+)

@@ -1,0 +1,88 @@
+"""What is done and told between a capture and the hand's opening."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from gtsam import Pose3
+
+from sessions.conductor.carrier import Carrier
+from sessions.conductor.estimator import Reorientation
+from sessions.motion.weighing import LiftEnd
+from sessions.perception.carrying.forecast import Forecast
+from sessions.recording.recorder import Level
+
+TURN, STAY = Reorientation(0.4, np.zeros(2)), Reorientation(0.0, np.zeros(2))
+HELD = frozenset({"FF", "MF", "TH"})
+FIRM = Forecast(force_N=1.2, slip_m=0.001, slip_rad=0.01, leans=False)
+SLIPPERY = Forecast(force_N=1.5, slip_m=0.012, slip_rad=0.2, leans=True)
+
+
+class Bench:
+    """A carrier with roles that only note what is asked of them."""
+
+    def __init__(self, forecast=FIRM, touching=HELD, may_weigh=True):
+        self.done, self.told, self.logged, self.motions = [], [], [], []
+        cycle = SimpleNamespace(
+            plan=None,
+            jammed=(),
+            squeeze=lambda touching: self.done.append("squeeze"),
+            reorient=lambda turn, shift, touching: self.done.append("re-orient") or Pose3(),
+        )
+        decisions = SimpleNamespace(may_weigh=lambda plan: may_weigh, on_carry=self.motions.append)
+        roles = SimpleNamespace(
+            supervisor=SimpleNamespace(count_contacts=lambda count: None),
+            performer=cycle,
+            decisions=decisions,
+            weigh=lambda touching: self.done.append("weigh") or LiftEnd.HUNG,
+            foretell=lambda grasp, turn, shift: self.done.append("foretell") or forecast,
+        )
+        properties = SimpleNamespace(in_words=lambda: "mass 300 g")
+        runtime = SimpleNamespace(
+            perception=SimpleNamespace(carry=None, properties=properties),
+            log=lambda level, source, text: self.logged.append(text),
+        )
+        self.grasp = SimpleNamespace(touching=touching, contacts=())
+        self.carrier = Carrier(runtime, roles, self.done.append, lambda level, text: self.told.append((level, text)))
+
+    def carry(self, wanted=TURN, weighed=False, last=False):
+        self.carrier.carry(self.grasp, wanted, weighed=weighed, last=last)
+        return self
+
+
+def test_a_carry_is_foretold_before_the_squeeze():
+    bench = Bench().carry()
+    assert bench.done == ["foretell", "squeeze", "squeeze", "re-orient", "re-orient"]
+    assert bench.told == []
+    assert bench.logged == ["each finger holds the object with 1.20 N"]
+
+
+def test_what_will_slip_or_tip_is_told():
+    (told,) = Bench(SLIPPERY).carry().told
+    assert told[0] is Level.WARNING
+    assert "will slip by about 12 mm, 11 degrees" in told[1]
+    assert "would tip over" in told[1]
+
+
+def test_nothing_is_said_of_an_object_that_was_not_measured():
+    bench = Bench(forecast=None).carry()
+    assert bench.logged == bench.told == []
+    assert "re-orient" in bench.done
+
+
+@pytest.mark.parametrize(
+    ("wanted", "touching", "last"), [(STAY, HELD, False), (TURN, frozenset({"MF"}), False), (TURN, HELD, True)]
+)
+def test_what_stays_is_neither_foretold_nor_squeezed(wanted, touching, last):
+    bench = Bench(touching=touching).carry(wanted, last=last)
+    assert bench.done == []
+    assert [motion.equals(Pose3(), 1e-12) for motion in bench.motions] == [True]
+
+
+def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
+    assert Bench().carry(weighed=True).done[:3] == ["weigh", "weigh", "foretell"]
+    refused = Bench(may_weigh=False).carry(weighed=True)
+    assert "weigh" not in refused.done
+    assert refused.told == [(Level.INFO, "the object is not weighed")]
