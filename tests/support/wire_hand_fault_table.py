@@ -22,22 +22,24 @@ OUTLINE = Outline(
     "wire-hand-faults",
     "Faults of hand and arm in the middle of sessions over real wires.",
     ("python -m tests.support.wire_hand_fault_table --store",),
-    "Sessions of one grasp of the box in real time, the hand's cycle 4 ms, each emulator in a process of its own; from "
-    "the recordings. A fault begins when the fingers first close, FFJ3 in the middle of its way. Last demand: from the "
-    "first status of the hand that shows the fault (where none does, from its beginning; for the frozen sensor from "
-    "when its joint is driven) until the last demand above zero, the time of the fault's rule (docs/failures.md) "
-    "included. Late cycles: those of the hand with such a demand after the rule's time.",
-    ("Rig", "Fault", "Rule", "Last demand", "Late cycles", "The session"),
+    "Sessions of one grasp of the box in real time, the hand's cycle 4 ms, the session's 10 ms, each emulator in a "
+    "process of its own; from the recordings. A fault begins when the fingers first close, FFJ3 in the middle of its "
+    "way. Seen: from then until the first status of the hand, or of the arm, that shows it (the frozen sensor: until "
+    "its joint is driven; where statuses end, until the last one). Last demand: from then, or from the beginning where "
+    "no status shows it, until the last demand above zero, the time of the fault's rule (docs/failures.md) included. "
+    "Late cycles: those of the hand with such a demand after the rule's time.",
+    ("Rig", "Fault", "Seen", "Rule", "Last demand", "Late cycles", "The session"),
     keys=2,
 )
 
 
 def cells(fault: WireFault, found: WireOutcome) -> tuple[str, ...]:
     """One line of the table, without rig and fault."""
+    seen = "" if found.seen_s is None else f"{1000 * found.seen_s:.0f} ms"
     rule = f"{1000 * fault.rule_s:.0f} ms" if fault.rule_s else ""
     if not found.reason:
-        return rule, "", "", "goes on"
-    return rule, f"{1000 * found.driven_s:.0f} ms", str(found.late_cycles), f"ends: {found.reason}"
+        return seen, rule, "", "", "goes on"
+    return seen, rule, f"{1000 * found.driven_s:.0f} ms", str(found.late_cycles), f"ends: {found.reason}"
 
 
 def main() -> None:

@@ -17,6 +17,9 @@ from unittest.mock import patch
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.orders import Order
+from drivers.positioner.ur.checks import stop_cause
+from drivers.positioner.ur.codec import decode_arm_status
+from drivers.positioner.ur.settings import UrSettings
 from drivers.shadow.device.hand_settings import HandSettings
 from drivers.shadow.device.joint_watch import SensorLimits
 from drivers.shadow.device.motor_watch import SILENT_AFTER_s
@@ -27,6 +30,7 @@ from sessions.conductor.session_outcome import Ending
 from sessions.recording.recorder import Recorder
 from sessions.recording.session import Session
 from sessions.recording.traffic import schemas
+from sessions.recording.traffic.reader import TrafficMessage
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.laboratory import WiredLaboratory
@@ -35,7 +39,7 @@ from tests.support.wire_sessions import At, emulated_laboratory, run
 _FFJ3, _CHANNEL = 1, 2  # the motor of FFJ3 and the channel of its sensor
 _MUST_MOVE = SensorLimits().frozen_share * HandSettings().gains.of("FFJ3").max_pwm
 _PALM = PALMS["0220"]
-_CYCLE_s = 0.004
+_CYCLE_s, _SESSION_CYCLE_s = 0.004, 0.01
 _BLIND_s = HandSettings().blind_after * _CYCLE_s
 
 
@@ -48,7 +52,8 @@ class WireFault:
         order: what it is told; for ``process`` a signal's name.
         told: part of the session's reason; "" if the session goes on.
         rule_s: time that the fault's rule waits (docs/failures.md).
-        shows: whether a status of the hand shows it; all do that come after the order unless given.
+        shows: whether a status of the hand shows it; all do that come after the order unless given. Faults of the arm
+            are shown by the arm's statuses.
         while_driven: it can be seen only from when FFJ3 is driven on.
         silences: it is seen by the statuses that no longer come: its time counts from the last one.
         ends: what ends it, and after how long, seconds; None for after the session.
@@ -69,11 +74,13 @@ class WireOutcome:
     """What a session made of a fault.
 
     Attributes:
-        driven_s: from when the hand's statuses show it until the last demand above zero was sent.
+        seen_s: from its beginning until a status shows it; None if none does.
+        driven_s: from then until the last demand above zero was sent.
         late_cycles: of the hand with a demand above zero after the rule's time.
         reason: why the session ended; "" if it was completed.
     """
 
+    seen_s: float | None
     driven_s: float
     late_cycles: int
     reason: str
@@ -143,19 +150,16 @@ HAND_FAULTS: dict[str, WireFault] = {
 }
 """On sim-wire."""
 
+
+def _arm(event: str, told: str, remedy: str = "release") -> WireFault:
+    return WireFault("base", {"event": event}, told, _SESSION_CYCLE_s, ends=(None, {"event": remedy}))
+
+
 ARM_FAULTS: dict[str, WireFault] = {
-    "arm: protective stop": WireFault(
-        "base", {"event": "protective stop"}, "protective stop", ends=(None, {"event": "release"})
-    ),
-    "arm: emergency stop": WireFault(
-        "base", {"event": "emergency stop"}, "emergency stop", ends=(None, {"event": "release"})
-    ),
-    "arm: program stopped on the pendant": WireFault(
-        "base", {"event": "stop program"}, "the program on the arm was stopped", ends=(None, {"event": "release"})
-    ),
-    "arm: cable unplugged": WireFault(
-        "base", {"event": "unplug"}, "has stopped answering", ends=(None, {"event": "plug"})
-    ),
+    "arm: protective stop": _arm("protective stop", "protective stop"),
+    "arm: emergency stop": _arm("emergency stop", "emergency stop"),
+    "arm: program stopped on the pendant": _arm("stop program", "the program on the arm was stopped"),
+    "arm: cable unplugged": _arm("unplug", "has stopped answering", "plug"),
 }
 """On sim-ur."""
 
@@ -176,8 +180,7 @@ def run_fault(fault: WireFault, rig: Rig, laboratory: WiredLaboratory, root: Pat
     reason = "" if outcome.ending is Ending.COMPLETE else outcome.reason
     assert fault.told in reason, reason
     assert bool(reason) == bool(fault.told), reason
-    driven_s, late_cycles = _driven_after(fault, folder, injection.begun_ns)
-    return WireOutcome(driven_s, late_cycles, reason)
+    return _outcome(fault, folder, injection.begun_ns, reason)
 
 
 class _Injection:
@@ -232,17 +235,17 @@ def _kept_runtimes(runtimes: list[RigRuntime]) -> Iterator[None]:
         yield
 
 
-def _driven_after(fault: WireFault, folder: Path, begun_ns: int) -> tuple[float, int]:
-    """Time from when a recording shows the fault until its last demand above zero, and the demands after its rule."""
+def _outcome(fault: WireFault, folder: Path, begun_ns: int, reason: str) -> WireOutcome:
+    """When a recording shows the fault, its last demand above zero, and the demands after the fault's rule."""
     shown_ns: int | None = None
     heard_ns, driven_ns = list[int](), list[int]()
     for message in Session.open(folder).traffic().messages():
         if message.stamp_ns < begun_ns:
             continue
+        if shown_ns is None and _shows(fault, message):
+            shown_ns = message.stamp_ns
         if message.topic == schemas.received_topic("hand"):
             heard_ns.append(message.stamp_ns)
-            if shown_ns is None and fault.shows(_PALM.decode_status(message.data)):
-                shown_ns = message.stamp_ns
         if message.topic == schemas.transmitted_topic("hand"):
             demands = _PALM.decode_command(message.data).motor_data
             if any(demands):
@@ -253,4 +256,14 @@ def _driven_after(fault: WireFault, folder: Path, begun_ns: int) -> tuple[float,
         shown_ns = max((stamp_ns for stamp_ns in heard_ns if stamp_ns < max(driven_ns, default=0)), default=None)
     since_ns = begun_ns if shown_ns is None else shown_ns
     due_ns, last_ns = since_ns + round(fault.rule_s * NANOSECONDS), max(driven_ns, default=since_ns)
-    return max(0, last_ns - since_ns) / NANOSECONDS, sum(stamp_ns > due_ns for stamp_ns in driven_ns)
+    seen_s = None if shown_ns is None else (shown_ns - begun_ns) / NANOSECONDS
+    late_cycles = sum(stamp_ns > due_ns for stamp_ns in driven_ns)
+    return WireOutcome(seen_s, max(0, last_ns - since_ns) / NANOSECONDS, late_cycles, reason)
+
+
+def _shows(fault: WireFault, message: TrafficMessage) -> bool:
+    if message.topic != schemas.received_topic("base" if fault.device == "base" else "hand"):
+        return False
+    if fault.device == "base":
+        return stop_cause(decode_arm_status(message.data).arm, UrSettings()) is not None
+    return fault.shows(_PALM.decode_status(message.data))

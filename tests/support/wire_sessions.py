@@ -21,6 +21,7 @@ from tactile_lab.rigs.description import Rig, rig_of_session
 from tactile_lab.rigs.laboratory import WiredLaboratory
 from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow import running
+from tactile_lab.workflow.attending import Attendance
 
 
 @dataclass
@@ -44,13 +45,18 @@ def emulated_laboratory(laboratory: WiredLaboratory) -> EmulatedLaboratory:
 
 
 def run(
-    rig: Rig, laboratory: WiredLaboratory, root: Path, progress: At, grasps: int = 1
+    rig: Rig,
+    laboratory: WiredLaboratory,
+    root: Path,
+    progress: At,
+    grasps: int = 1,
+    attendance: Attendance = running.ALONE,
 ) -> tuple[SessionOutcome, Path]:
     """A session as ``tactile-lab run`` makes it, in a laboratory that is running already."""
     request = running.SessionRequest(rig.source, "box-10x6x4", root, grasps=grasps)
     slam = TactileSlam(running.slam_settings("joint", 2, rig.description.motion), 0)
     session = running._new_session(rig, laboratory, slam, request, ())
-    return running._record(session, rig, laboratory, slam, request, progress, running.ALONE), session.folder
+    return running._record(session, rig, laboratory, slam, request, progress, attendance), session.folder
 
 
 def check_ended_in_order(folder: Path, words: str) -> None:

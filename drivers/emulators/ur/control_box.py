@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal, Protocol
 
 import numpy as np
-from gtsam import Pose3
+from gtsam import Pose3, Rot3
 
 from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.contacts import Array
@@ -186,6 +186,11 @@ class ControlBox:
         """Something else hangs on the flange."""
         self._mass_kg = mass_kg
 
+    def lead(self, up_m: float) -> None:
+        """A person lifts the hand by so much; an arm gives way in freedrive alone."""
+        if self.free:
+            self._forearm.move(Pose3(Rot3(), np.array([0.0, 0.0, up_m])) * self._forearm.place())
+
     def stop_program(self) -> None:
         """The program ends; the arm stands."""
         self._end(_STOPPED)
@@ -249,8 +254,9 @@ EVENTS: Mapping[str, Callable[[ControlBox, float], None]] = {
     "speed slider": _set("speed_fraction"),
     "push": _set("pushed_N"),
     "carry": ControlBox.carry,
+    "lead": ControlBox.lead,
     "local control": lambda box, _: setattr(box, "remote", False),
     "unplug": lambda box, _: setattr(box, "plugged", False),
     "plug": lambda box, _: setattr(box, "plugged", True),
 }
-"""What befalls an arm; of some the value counts: a share, newtons, kilograms."""
+"""What befalls an arm; of some the value counts: a share, newtons, kilograms, metres."""

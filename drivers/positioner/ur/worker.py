@@ -32,7 +32,7 @@ from drivers.positioner.ur.codec import (
 from drivers.positioner.ur.limiter import MotionLimiter
 from drivers.positioner.ur.rtde_arm import RtdeArm
 from drivers.positioner.ur.settings import UrSettings
-from drivers.shadow.device.real_time import request_real_time
+from drivers.shadow.device.real_time import request_real_time, threads
 
 _PRIORITY = 70
 """Where permitted the stream comes before sessions and emulators, and after the hand."""
@@ -163,7 +163,7 @@ def main() -> None:
             found = arm.connect()
             pipe.put(RecordKind.READY, clock.now_ns(), json.dumps({"found": found}).encode())
             pipe.flush()
-            request_real_time(_PRIORITY)
+            request_real_time(_PRIORITY, threads())  # those of the package too: what they hear late counts as unheard
             stream(UrWorker(arm, settings, pipe, clock), orders, clock, settings.cycle_s)
     finally:
         if arm is not None:

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 PRIORITY = 80
 SESSION_PRIORITY = 20
 SWITCH_INTERVAL_s = 1e-4
 
 
-def request_real_time(priority: int = PRIORITY) -> str:
-    """Ask for the real-time scheduler; what came of it, in words."""
+_THIS_THREAD = 0
+
+
+def threads() -> list[int]:
+    """Every thread of this process, by number; a library may have started some."""
+    return [int(task.name) for task in Path("/proc/self/task").iterdir()]
+
+
+def request_real_time(priority: int = PRIORITY, of: Iterable[int] = (_THIS_THREAD,)) -> str:
+    """Ask for the real-time scheduler, for these threads; what came of it, in words."""
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        for thread in of:
+            with suppress(ProcessLookupError):  # it has just ended
+                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
     except PermissionError:
         return "normal scheduling: no permission for SCHED_FIFO (grant it with an rtprio line in limits.conf)"
     return f"SCHED_FIFO, priority {priority}"

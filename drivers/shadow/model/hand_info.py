@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pydantic import ConfigDict
+from pydantic import ConfigDict, field_validator
 
 from drivers.core import configuration
 from drivers.core.configuration import StrictModel
@@ -37,15 +37,21 @@ class HandInfo(StrictModel):
 
     Attributes:
         side: of the hand.
-        fingers: that it has, in lower case, the thumb as ``th``.
+        fingers: that it has, in lower case, the thumb as ``th``; published folders with ``False`` state none, and
+            the motor map tells.
         mapping_path: where its motor map is among Shadow's.
     """
 
     model_config = ConfigDict(extra="ignore")
 
     side: Side
-    fingers: tuple[str, ...] = tuple(map(str.lower, FINGERS))
+    fingers: tuple[str, ...] | None = tuple(map(str.lower, FINGERS))
     mapping_path: _MapPlace | None = None
+
+    @field_validator("fingers", mode="before")
+    @classmethod
+    def _none_are_stated(cls, told: object) -> object:
+        return None if told in ("False", False) else told
 
 
 @dataclass(frozen=True)
@@ -120,7 +126,8 @@ def told_form(motors: Path, infos: Mapping[Path, HandInfo], stated: HandStatemen
     told |= {str(motors): motor_map.told_side, stated.where: stated.side}
     form = HandForm(_agreed_side({place: side for place, side in told.items() if side is not None}), motor_map.driven)
     for place, info in infos.items():
-        _check_fingers(form, tuple(map(str.upper, info.fingers)), str(place), motors)
+        if info.fingers is not None:
+            _check_fingers(form, tuple(map(str.upper, info.fingers)), str(place), motors)
     if stated.fingers is not None:
         _check_fingers(form, stated.fingers, stated.where, motors)
     return form

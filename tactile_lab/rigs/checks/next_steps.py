@@ -14,6 +14,10 @@ _CALIBRATION = "calibration "
 _ORDER = ("camera", "markers", "geometry", "forearm", "joints", "fingertips")
 """Each needs those before it."""
 
+_TOGETHER = (
+    "The other devices alone, then all of them in one rig file of kind wired: docs/real-laboratory.md, the first day"
+)
+
 
 def next_steps(rig: str, findings: Sequence[Finding], *, moved: bool) -> list[str]:
     """What to do next, one step a line.
@@ -38,6 +42,8 @@ def next_steps(rig: str, findings: Sequence[Finding], *, moved: bool) -> list[st
     if has_sessions:
         first = "First session, over an empty table" if has_motors else "First session"
         steps.append(f"{first}: tactile-lab run --rig {rig} --grasps 1")
+    else:
+        steps.append(_TOGETHER)
     return steps
 
 

@@ -69,6 +69,13 @@ def test_fingers_that_the_motor_map_does_not_drive_are_told(tmp_path: Path) -> N
         form_of(folder)
 
 
+@pytest.mark.parametrize("word", ["False", "false"])
+def test_a_folder_that_states_no_fingers_leaves_them_to_the_motor_map(tmp_path: Path, word: str) -> None:
+    folder = write_folder(tmp_path, FULL_RIGHT)
+    folder.info.write_text(f"side: right\nfingers: {word}\nsensors: {{tip: {{}}}}\n")
+    assert form_of(folder) == RIGHT_HAND
+
+
 def test_a_folder_with_a_typing_error_is_named(tmp_path: Path) -> None:
     folder = write_folder(tmp_path, FULL_RIGHT)
     folder.info.write_text(folder.info.read_text().replace("right", "rihgt"))

@@ -39,10 +39,12 @@ def test_a_rig_that_is_ready_is_told_how_to_begin() -> None:
     assert next_steps("sim", [SOUND], moved=False) == ["First session: tactile-lab run --rig sim --grasps 1"]
 
 
-def test_a_rig_of_single_devices_has_no_session(tmp_path: Path) -> None:
+def test_a_rig_of_single_devices_is_followed_by_one_of_all(tmp_path: Path) -> None:
     file = tmp_path / "hand.yaml"
     file.write_text("kind: hand\n")
-    assert next_steps(str(file), [SOUND], moved=True) == []
-    assert next_steps(str(file), [SOUND], moved=False) == [
-        f"Clear the space around the hand, then nudge every motor: tactile-lab rig check {file} --move"
-    ]
+    nudge = f"Clear the space around the hand, then nudge every motor: tactile-lab rig check {file} --move"
+    (together,) = next_steps(str(file), [SOUND], moved=True)
+    assert together.startswith("The other devices alone, then all of them in one rig file of kind wired")
+    assert next_steps(str(file), [SOUND], moved=False) == [nudge, together]
+    file.write_text("kind: fingertips\n")
+    assert next_steps(str(file), [SOUND], moved=False) == [together]
