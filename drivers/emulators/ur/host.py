@@ -29,12 +29,14 @@ from drivers.emulators.ur.rtde_server import RtdeClient
 from drivers.positioner.kinematics import mount_joints, mount_T_forearm
 from drivers.positioner.ur.poses import pose_of
 from drivers.positioner.ur.settings import UrSettings
+from drivers.shadow.device.real_time import request_real_time
 from drivers.simulation.hand_plant import CarriedPlant
 
 _DASHBOARD, _PROGRAMS, _RTDE = 29999, (30001, 30002, 30003), 30004
 _GREETING = b"Connected: Universal Robots Dashboard Server\n"
 _TURN_s = 0.002
 _AT_ONCE = 65536
+_PRIORITY = 75
 
 
 class PlantForearm:
@@ -174,7 +176,11 @@ class _Programs:
 
 
 def make(start: dict[str, Any], clock: Clock) -> UrHost:
-    """The box at the wiring's ``host``; what it carries is truly what the rig file states."""
+    """The box at the wiring's ``host``; what it carries is truly what the rig file states.
+
+    A real box is a computer of its own: where permitted it comes before the program that speaks with it.
+    """
+    request_real_time(_PRIORITY)
     settings = UrSettings.model_validate(start["settings"])
     forearm = PlantForearm(PlantMirror(Path(start["mirror"]), clock), Pose3(np.array(start["world_T_mount"])))
     flange_T_forearm = Pose3() if settings.flange_T_forearm is None else pose_of(settings.flange_T_forearm)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 from collections.abc import Sequence
 from typing import Any, Protocol
 
@@ -35,7 +36,10 @@ from drivers.positioner.ur.settings import UrSettings
 from drivers.shadow.device.real_time import request_real_time, threads
 
 _PRIORITY = 70
-"""Where permitted the stream comes before sessions and emulators, and after the hand."""
+"""Where permitted the stream comes before sessions, and after the hand."""
+
+_LISTENER_PRIORITY = 71
+"""Of the package's own threads: calls of the package wait for what they hear, without giving the processor away."""
 
 _RUNS = ArmFlags.HEARD | ArmFlags.PROGRAM
 """Without these the arm stops by itself, and would take no command."""
@@ -102,6 +106,7 @@ class UrWorker:
     def _restart(self) -> None:
         try:
             self._arm.restart()
+            _prefer_listeners()
         except DeviceError:
             self._arm.braked = True  # the next statuses say why
         self._limiter = self._limiter_from(self._arm.q())
@@ -163,11 +168,18 @@ def main() -> None:
             found = arm.connect()
             pipe.put(RecordKind.READY, clock.now_ns(), json.dumps({"found": found}).encode())
             pipe.flush()
-            request_real_time(_PRIORITY, threads())  # those of the package too: what they hear late counts as unheard
+            request_real_time(_PRIORITY)
+            _prefer_listeners()
             stream(UrWorker(arm, settings, pipe, clock), orders, clock, settings.cycle_s)
     finally:
         if arm is not None:
             arm.close()
+
+
+def _prefer_listeners() -> None:
+    """The package's threads come before the one that calls it; an arm that is heard late counts as unheard."""
+    if os.sched_getscheduler(0) == os.SCHED_FIFO:
+        request_real_time(_LISTENER_PRIORITY, set(threads()) - {threading.get_native_id()})
 
 
 def _own_output() -> int:
