@@ -139,8 +139,11 @@ def test_an_arm_is_moved_stopped_resumed_led_and_lost(served: Served) -> None:
 
 
 def test_an_arm_of_the_cb3_series_is_moved() -> None:
-    """It is told from its version, knows no remote control, and sends 125 times a second at most."""
+    """It is told from its version, knows no remote control, sends 125 times a second at most, and the first versions
+    do not name their model.
+    """
     served = Served(21, "cb3")
+    served.box.version = (3, 11, 0, 82155)
     try:
         served.device.connect()
         assert (served.box.payload_kg, served.box.output("runtime_state")) == (4.6, 2)
@@ -167,6 +170,13 @@ def test_where_the_arm_stands_is_read_with_the_tool_that_was_set(
     monkeypatch.setattr(RtdeClient, "data", tell_late)
     served.device.connect()
     np.testing.assert_allclose(served.device.exchange().q, HERE, atol=1e-6)
+
+
+def test_an_arm_whose_software_is_not_known_is_refused_before_it_is_taken_over(served: Served) -> None:
+    served.box.version = (10, 7, 0, 1)
+    with pytest.raises(DeviceError, match=r"PolyScope 10\.7\.0\.1 is not known to this program\. CB3 arms need"):
+        served.device.connect()
+    assert served.box.output("runtime_state") == 1
 
 
 def test_an_arm_whose_inputs_another_program_holds_is_refused(served: Served) -> None:

@@ -56,7 +56,7 @@ class ControlBox:
         self._forearm, self._clock, self._mass_kg = forearm, clock, mass_kg
         self._flange_T_forearm = flange_T_forearm
         self._flange_T_tcp = Pose3()
-        self.version = (5, 12, 0, 1101319) if series == "e" else (3, 15, 8, 106339)
+        self.version: tuple[int, int, int, int] = (5, 12, 0, 1101319) if series == "e" else (3, 15, 8, 106339)
         self.highest_Hz = 500.0 if series == "e" else 125.0
         self.robot_mode, self.safety_bits, self.runtime_state = _RUNNING, _NORMAL, _STOPPED
         self.speed_fraction, self.remote, self.plugged = 1.0, True, True
@@ -143,7 +143,7 @@ class ControlBox:
                 return "URSoftware " + ".".join(map(str, self.version)) + " (emulated)"
             case ["is", "in", "remote", "control"] if self.version[0] > 3:
                 return str(self.remote).lower()
-            case ["get", "robot", "model"]:
+            case ["get", "robot", "model"] if self.version >= (3, 12):
                 return "UR10"
             case ["get", "serial", "number"]:
                 return "20000000000"

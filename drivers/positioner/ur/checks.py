@@ -16,6 +16,8 @@ from drivers.positioner.ur.settings import UrSettings
 
 READY_MODE = 7
 PLAYING = 2
+_FIRST_MINOR = {3: 11, 5: 6}
+"""First minor version of PolyScope that is known, by the major one: CB3, and e-Series."""
 
 ROBOT_MODES = {
     -1: "NO CONTROLLER",
@@ -53,6 +55,15 @@ class Refusal:
 
 
 UNHEARD = Refusal("the arm has stopped answering; it stops by itself", "Check its cable and its power")
+
+
+def wrong_version(version: str) -> Refusal | None:
+    """Why an arm with this version of PolyScope is none for this program, such as 3.5.1 or 10.7; None if it is."""
+    major, minor = (int(part) for part in version.split(".")[:2])
+    if minor >= _FIRST_MINOR.get(major, minor + 1):
+        return None
+    hint = "CB3 arms need PolyScope 3.11 or a later 3, e-Series arms 5.6 or a later 5; PolyScope X is not supported"
+    return Refusal(f"PolyScope {version} is not known to this program", hint)
 
 
 def safety_stop(arm: ArmState) -> Refusal | None:

@@ -19,7 +19,7 @@ from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.contacts import Array
 from drivers.core.errors import DeviceError
 from drivers.positioner.kinematics import mount_joints, mount_T_forearm
-from drivers.positioner.ur.checks import PLAYING, Refusal, before_motion, before_program
+from drivers.positioner.ur.checks import PLAYING, Refusal, before_motion, before_program, wrong_version
 from drivers.positioner.ur.codec import ArmFlags, ArmState
 from drivers.positioner.ur.poses import pose_of, tcp_of
 from drivers.positioner.ur.settings import UrSettings
@@ -75,9 +75,9 @@ class RtdeArm:
         """
         for port, purpose in _PORTS.items():
             self._knock(port, purpose)
+        found = self._identity()
         self._listen()
         self._refuse(before_program(self.state(), self.q(), self._settings))
-        found = self._identity()
         self._control = self._called("rtde_control", "RTDEControlInterface", self._rate_hz)
         self._prepare()
         return f"{found}, payload {self._settings.payload_kg} kg"
@@ -113,14 +113,16 @@ class RtdeArm:
             raise self._error(f"cannot be taken over ({words})", "Look at the pendant, then try again") from error
 
     def _identity(self) -> str:
-        """Model and version. Raises DeviceError for an arm in local control."""
+        """Model and version. Raises DeviceError for a version that is not known here, and an arm in local control."""
         dashboard = importlib.import_module("dashboard_client").DashboardClient(self._host)
         try:
             dashboard.connect(round(_ANSWER_s * 1000))
             version = str(dashboard.polyscopeVersion()).removeprefix("URSoftware ").split(" ")[0]
+            self._refuse(wrong_version(version))
             if int(version.split(".")[0]) >= _FIRST_LOCAL_VERSION and not dashboard.isInRemoteControl():
                 raise self._error("the arm is in local control", "Switch it to remote control at the pendant")
-            return f"{dashboard.getRobotModel()}, PolyScope {version}"
+            model = str(dashboard.getRobotModel())  # the first versions that are known here do not tell it
+            return f"{model if model.startswith('UR') else 'arm of Universal Robots'}, PolyScope {version}"
         except (RuntimeError, ValueError) as error:
             raise self._error(f"the dashboard does not answer ({error})", "Restart the arm, then try again") from error
         finally:

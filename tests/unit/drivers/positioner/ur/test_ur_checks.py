@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.positioner.ur.checks import before_motion, before_program, outside, stop_cause
+from drivers.positioner.ur.checks import before_motion, before_program, outside, stop_cause, wrong_version
 from drivers.positioner.ur.codec import ArmFlags, ArmState
 from drivers.positioner.ur.settings import UrSettings
 
@@ -55,6 +55,18 @@ def test_a_place_outside_the_workspace_is_named(q: list[float], words: str) -> N
     refusal = outside(np.array(q), SETTINGS)
     assert refusal is not None
     assert words in refusal.what
+
+
+@pytest.mark.parametrize("version", ["3.11.0.82155", "3.15.8", "5.6.0", "5.25.1.118000"])
+def test_versions_of_both_series_are_known_from_their_first_on(version: str) -> None:
+    assert wrong_version(version) is None
+
+
+@pytest.mark.parametrize("version", ["3.10.1", "5.5.1", "1.8.2", "10.7.0"])
+def test_other_versions_are_refused_by_their_number(version: str) -> None:
+    refusal = wrong_version(version)
+    assert refusal is not None
+    assert refusal.what == f"PolyScope {version} is not known to this program"
 
 
 def test_a_load_felt_at_rest_means_a_wrong_payload() -> None:
