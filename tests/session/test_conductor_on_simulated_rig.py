@@ -242,6 +242,7 @@ def test_pulled_cable_stops_the_session_and_keeps_its_grasps() -> None:
     assert len(session.outcome.grasps) == 1
 
 
+@pytest.mark.long
 def test_object_out_of_reach_is_told() -> None:
     session = run(9, start=ObjectStart(x_m=0.3, y_m=0.3, yaw_rad=0.0), safety=SafetySettings(empty_grasps=1))
     assert session.outcome.ending is Ending.OBJECT_LOST

@@ -10,13 +10,11 @@ from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending
 from tactile_lab.workflow.running import SessionRequest, run_session
 
-FIRST = ("sim-biotac", 5)
-OTHERS = (("sim-left", 5), ("sim-lite", 4))
+RIGS = (("sim-biotac", 5), ("sim-left", 5), ("sim-lite", 4))
 
 
-@pytest.mark.parametrize(
-    ("rig", "fingers"), [FIRST, *(pytest.param(*other, marks=pytest.mark.long) for other in OTHERS)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("rig", "fingers"), RIGS)
 def test_the_object_is_found_and_grasped(tmp_path: Path, rig: str, fingers: int) -> None:
     finished = run_session(SessionRequest(rig, "box-10x6x4", tmp_path, method="odometry", grasps=1), NullProgress())
     assert finished.outcome is not None

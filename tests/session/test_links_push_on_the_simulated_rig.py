@@ -29,7 +29,7 @@ class Forgetful:
         pass
 
 
-@pytest.mark.parametrize(("height_m", "clear"), [(0.018, False), (0.034, True)])
+@pytest.mark.parametrize(("height_m", "clear"), [(0.018, False), pytest.param(0.034, True, marks=pytest.mark.long)])
 def test_the_hand_comes_down_over_a_cube_of_6_cm_only_where_its_links_are_clear(height_m: float, clear: bool) -> None:
     rig = load_rig("sim")
     start = ObjectStart(x_m=0.0, y_m=0.0, yaw_rad=0.0)

@@ -133,6 +133,7 @@ def test_a_calibration_copy_changed_or_missing(inside, session_copy):
     refused(inside("session", "replay", session_copy), "joints.yaml", "cannot be read")
 
 
+@pytest.mark.long
 def test_deleted_results_are_made_again_by_a_replay(inside, session_copy):
     before = {path.name: path.read_bytes() for path in (session_copy / "results").iterdir()}
     shutil.rmtree(session_copy / "results")
@@ -168,6 +169,7 @@ def test_evaluating_a_damaged_recording_warns(inside, session_copy):
     json.loads(answer.out)
 
 
+@pytest.mark.long
 def test_a_session_never_closed_is_shown_and_replayed(inside, session_copy):
     manifest = session_copy / "session.yaml"
     manifest.write_text(manifest.read_text().replace("status: closed", "status: open"))

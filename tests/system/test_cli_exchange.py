@@ -346,6 +346,7 @@ def test_a_calibration_that_is_not_the_recorded_one_is_refused_wherever_bytes_ar
     assert not (tmp_path / "tables").exists()
 
 
+@pytest.mark.long
 def test_a_trajectory_edited_by_hand_shows_in_the_replay(inside, session_copy):
     trajectory = session_copy / "results" / "trajectory.csv"
     lines = trajectory.read_text().splitlines()

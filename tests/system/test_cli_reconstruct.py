@@ -334,6 +334,7 @@ def test_contacts_on_one_face_leave_the_others_unknown(inside, tmp_path):
     assert "only one side of the object" in document["warnings"][0]
 
 
+@pytest.mark.long
 def test_contacts_repeated_at_one_place_make_no_certain_shape(inside, planar_log, tmp_path):
     def repeat(document: dict) -> None:
         for grasp in document["grasps"]:

@@ -95,6 +95,7 @@ def test_another_seed_of_the_estimation_gives_another_result_in_the_replay_folde
     assert original["seed"] == 1
 
 
+@pytest.mark.long
 def test_a_replay_removes_what_an_earlier_one_left(inside, session_copy):
     (session_copy / "replay").mkdir()
     (session_copy / "replay" / "contour.csv").write_text("of another estimation")

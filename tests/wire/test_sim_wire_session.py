@@ -88,7 +88,7 @@ def test_a_session_is_completed_and_replays_to_the_same_grasp(
     [
         pytest.param("camera", "camera: lost", marks=pytest.mark.long),
         ("hand", "no valid status for 2 s"),
-        ("ft/MF", "MF: no reading from the fingertip"),
+        pytest.param("ft/MF", "MF: no reading from the fingertip", marks=pytest.mark.long),
         pytest.param("base", "cycles in a row without a status", marks=pytest.mark.long),
     ],
 )

@@ -56,7 +56,7 @@ def test_a_mechanism_that_proposes_nothing_changes_nothing() -> None:
     assert not on.changed
 
 
-@pytest.mark.parametrize("name", ["relocation", "placing on the object"])
+@pytest.mark.parametrize("name", [pytest.param("relocation", marks=pytest.mark.long), "placing on the object"])
 def test_a_run_without_a_mechanism_that_says_it_did_nothing_is_the_same(name: str) -> None:
     """With a seed that is run again all the same."""
     full = track_without(left_out(NOTHING))

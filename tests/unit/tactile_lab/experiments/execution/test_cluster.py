@@ -126,6 +126,7 @@ def test_a_cluster_that_gives_other_results_is_refused(threads: list[int], versi
         cluster_module._check_cluster(client, "tcp://there")
 
 
+@pytest.mark.long
 def test_a_scheduler_that_ends_ends_the_experiment(tmp_path: Path) -> None:
     with DaskCluster(tmp_path, workers=1) as started:
         settings = RunnerSettings(scheduler=started.address)
