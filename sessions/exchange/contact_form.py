@@ -71,12 +71,14 @@ _Angle = Annotated[float, _short(float(np.pi), "degrees")]
 class MotionSigma(StrictModel):
     """Standard deviations of one re-orientation, per axis.
 
-    ``unheld`` is the share of them that holds where the hand left the object in place.
+    ``unheld`` is the share of them that holds where the hand left the object in place. ``palm_m`` is the palm's own, in
+    each grasp, which all its contacts have in common.
     """
 
     translation_m: _Length = Field(ge=0.0)
     rotation_rad: _Angle = Field(ge=0.0)
     unheld: float = Field(default=1.0, gt=0.0, le=1.0)
+    palm_m: _Length = Field(default=0.0, ge=0.0)
 
 
 class StepSigmaEntry(StrictModel):

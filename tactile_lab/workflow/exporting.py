@@ -88,7 +88,8 @@ def _common_point_sigma_m(contacts: Sequence[Contact]) -> float:
 
 
 def _motion_sigma(noise: MotionNoise) -> MotionSigma:
-    return MotionSigma(translation_m=noise.translation_m, rotation_rad=noise.rotation_rad, unheld=noise.unheld)
+    given = noise.model_dump(include={"translation_m", "rotation_rad", "unheld", "palm_m"})
+    return MotionSigma.model_validate(given)
 
 
 def _truth(session: Session, path: Path) -> ObjectTruth:

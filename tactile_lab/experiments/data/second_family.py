@@ -3,7 +3,8 @@
 An estimator that was tuned on one generator may state uncertainties that hold for that generator only. Here fingers
 come from evenly spread directions towards points inside the object; the errors of contacts have heavy tails, are partly
 common to a grasp (an error of the palm's pose) and partly to a session (the sensors' bias); slips have heavy tails.
-Their standard deviations are those that contacts and settings state: 1 mm, 5 degrees, 10 mm and 20 degrees.
+Their standard deviations are those that contacts and settings state: 1 mm (of which the palm has a part), 5 degrees,
+10 mm and 20 degrees.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ SLIP_SIGMA_m, SLIP_SIGMA_rad = 0.010, float(np.deg2rad(20.0))
 
 _COMMON_SHARE = 0.3
 """Share of the variance of a contact's position that all contacts of a grasp have in common."""
+
+OWN_SIGMA_m, PALM_SIGMA_m = POINT_SIGMA_m * np.sqrt([1.0 - _COMMON_SHARE, _COMMON_SHARE])
+"""What contacts state, and what is stated of the palm: that all contacts of a grasp have in common."""
 
 _BIAS_m = 0.0002
 """How much deeper all contacts of a session lie than the surface."""
@@ -182,7 +186,7 @@ class _Hand:
 
     def close(self) -> tuple[tuple[Contact, ...], tuple[ApproachPath, ...]]:
         """Five fingers from evenly spread directions, each on a straight line; a finger may miss."""
-        common_m = np.sqrt(_COMMON_SHARE) * POINT_SIGMA_m * self._noisy * self._rng.normal(size=3)
+        common_m = PALM_SIGMA_m * self._noisy * self._rng.normal(size=3)
         first_rad = self._rng.uniform(0.0, 2 * np.pi)
         contacts, lines = [], []
         for number, finger in enumerate(FINGERS):
@@ -211,12 +215,12 @@ class _Hand:
         if found is None:
             return None
         point, normal = np.asarray(pose.transformFrom(found[0])), np.asarray(pose.rotation().rotate(found[1]))
-        own_m = np.sqrt(1 - _COMMON_SHARE) * POINT_SIGMA_m * self._heavy(_CONTACT_FREEDOM, 3)
+        own_m = OWN_SIGMA_m * self._heavy(_CONTACT_FREEDOM, 3)
         point = point - _BIAS_m * normal + common_m + self._noisy * own_m
         normal = normal + self._noisy * NORMAL_SIGMA_rad * self._heavy(_CONTACT_FREEDOM, 3)
         if rng.random() < self._wrong_share:
             point, normal = point + self._noisy * rng.normal(0.0, _WRONG_m, 3), self._noisy * rng.normal(size=3)
-        return Contact(finger, point, _unit(normal), POINT_SIGMA_m**2 * np.eye(3), NORMAL_SIGMA_rad, _FORCE_N)
+        return Contact(finger, point, _unit(normal), OWN_SIGMA_m**2 * np.eye(3), NORMAL_SIGMA_rad, _FORCE_N)
 
     def _heavy(self, freedom: float, count: int) -> Array:
         """Numbers of Student's t distribution, of variance 1."""

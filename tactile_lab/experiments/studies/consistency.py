@@ -23,6 +23,7 @@ from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
 FIRST, SECOND = "first", "second"
 """The families of simulated contacts: :mod:`planar_data` and :mod:`spatial_data`, and :mod:`second_family`."""
@@ -52,7 +53,9 @@ def assessed_run(cell: Cell) -> dict[str, Any]:
     Approach paths are unknown where contacts are wrong.
     """
     data = _data(cell)
-    slam = TactileSlam(SlamSettings(dimension=cell["dimension"]), cell.seed)
+    palm_m = second_family.PALM_SIGMA_m if cell["family"] == SECOND else 0.0
+    settings = SlamSettings(dimension=cell["dimension"], motion=MotionNoise(palm_m=palm_m))
+    slam = TactileSlam(settings, cell.seed)
     for grasp in data.grasps:
         slam.add_grasp(grasp)
     result = slam.finish()

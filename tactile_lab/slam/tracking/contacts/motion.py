@@ -31,6 +31,8 @@ class MotionNoise(StrictModel):
         translation_m, rotation_rad: per axis, and about the vertical.
         unheld: share of these that applies if the hand did not carry the object between two grasps, and only the
             closing hand may have pushed it. 1 if objects may also be moved by others.
+        palm_m: of the palm's position at a grasp, per axis: an error that its contacts have in common, beyond their
+            own, and that therefore only the covariances of poses hold.
         gripped: the hand's grip bounds slips, so that large ones are less likely than under a normal distribution.
     """
 
@@ -39,6 +41,7 @@ class MotionNoise(StrictModel):
     translation_m: float = Field(default=0.010, gt=0)
     rotation_rad: float = Field(default=float(np.deg2rad(20.0)), gt=0)
     unheld: float = Field(default=1.0, gt=0, le=1)
+    palm_m: float = Field(default=0.0, ge=0)
     gripped: bool = True
 
     @property

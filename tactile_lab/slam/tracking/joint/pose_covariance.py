@@ -5,6 +5,9 @@ poses do not, not even of round objects, so they are used wherever contacts form
 
 The object frame is born at the first grasp, whose pose is therefore given. An error of that grasp is an error of all
 other poses in the same direction; in the frame in which all grasps agree best it counts as one of many.
+
+An error that all contacts of a grasp have in common, because the palm was not quite where it is said to have been,
+moves the pose and leaves no trace in the contacts: it has to be stated (decision 65).
 """
 
 from __future__ import annotations
@@ -39,11 +42,11 @@ class PoseCovariances:
     def of(cls, contact_map: ContactMap, noise: MotionNoise) -> PoseCovariances:
         """From poses of largest evidence, all contacts and motions."""
         count, size = len(contact_map.placed), contact_map.space.size
-        joint = np.zeros((count * size, count * size))
+        joint = _palm(contact_map, noise)
         if count > 1:
-            joint[size:, size:] = np.linalg.inv(_information(contact_map, noise))
-        centred = np.eye(count * size) - _mean_frame(contact_map)
-        return cls(_blocks(joint, size), _blocks(centred @ joint @ centred.T, size))
+            joint[size:, size:] += np.linalg.inv(_information(contact_map, noise))
+        born, centred = (np.eye(count * size) - frame for frame in _frames(contact_map))
+        return cls(_blocks(born @ joint @ born.T, size), _blocks(centred @ joint @ centred.T, size))
 
 
 def with_covariances(contact_map: ContactMap, covariances: Array) -> ContactMap:
@@ -60,16 +63,25 @@ def _information(contact_map: ContactMap, noise: MotionNoise) -> Array:
         return PoseEvidence(contact_map, noise).information(contact_map.rows)
 
 
-def _mean_frame(contact_map: ContactMap) -> Array:
-    """By all pose vectors: how each changes with the mean of all object frames, shape (n size, n size)."""
+def _palm(contact_map: ContactMap, noise: MotionNoise) -> Array:
+    """The part of all poses' covariance that contacts do not tell: where the palm was in each grasp."""
+    space = contact_map.space
+    variances = np.where(np.arange(space.size) < space.translations, noise.palm_m**2, 0.0)
+    return np.diag(np.tile(variances, len(contact_map.placed)))
+
+
+def _frames(contact_map: ContactMap) -> tuple[Array, Array]:
+    """By all pose vectors: how each changes with the first object frame, and with the mean one, (n size, n size)."""
     space, rows = contact_map.space, contact_map.rows
     count, size = len(rows), space.size
     by_frame = np.zeros((count, size, size))
     for axis in range(size):
         step = np.tile(_STEP * np.eye(size)[axis], (count, 1))
         by_frame[:, :, axis] = space.deviation(space.compose(rows, step), rows) / _STEP
-    to_frame = np.linalg.inv(by_frame)
-    return by_frame.reshape(-1, size) @ to_frame.transpose(1, 0, 2).reshape(size, -1) / count
+    to_frame, moved = np.linalg.inv(by_frame), by_frame.reshape(-1, size)
+    first = np.zeros((count * size, count * size))
+    first[:, :size] = moved @ to_frame[0]
+    return first, moved @ to_frame.transpose(1, 0, 2).reshape(size, -1) / count
 
 
 def _blocks(joint: Array, size: int) -> Array:

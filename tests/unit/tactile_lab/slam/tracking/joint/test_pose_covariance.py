@@ -60,6 +60,17 @@ def test_the_first_pose_is_given_in_its_own_frame_and_not_in_the_common_one() ->
     np.testing.assert_array_equal(told.placed[5].covariance, covariances.birth[5])
 
 
+def test_an_error_of_the_palm_adds_to_each_pose_and_the_first_ones_to_all() -> None:
+    _, found = smoothed("rectangle", 1)
+    alone, with_palm = PoseCovariances.of(found, NOISE), PoseCovariances.of(found, MotionNoise(palm_m=0.002))
+    more = with_palm.birth - alone.birth
+    np.testing.assert_allclose(more[0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(more[1:, :2, :2], np.tile(2 * 0.002**2 * np.eye(2), (11, 1, 1)), rtol=1e-4, atol=1e-12)
+    np.testing.assert_allclose(more[:, 2, 2], 0.0, atol=1e-9)
+    spread = (with_palm.common - alone.common)[:, :2, :2].trace(axis1=1, axis2=2)
+    np.testing.assert_allclose(spread, 2 * 0.002**2 * (1 - 1 / 12), rtol=1e-3)
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_few_grasps_have_covariances_too(count: int) -> None:
     covariances = PoseCovariances.of(true_map("rectangle", 1, count=count), NOISE)
