@@ -67,7 +67,8 @@ def exchanged(contact_map: ContactMap) -> list[Doubt]:
         return loose(steps)
     if worst.shared < _LEAST_SHARED:
         words = (
-            f"nothing that was touched before was touched again from grasp {worst.grasp + 1} on: is it another object?"
+            f"nothing that was touched before was touched again from grasp {worst.grasp + 1} on: is it another object, "
+            "or was it moved?"
         )
     else:
         words = f"contacts before and from grasp {worst.grasp + 1} on do not fit each other: is it another object?"

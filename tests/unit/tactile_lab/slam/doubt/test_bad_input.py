@@ -98,7 +98,7 @@ def test_two_objects_one_after_the_other_in_one_log_are_told_with_the_first_gras
     assert result.status == "ambiguous"
     (told,) = [doubt for doubt in result.doubts if doubt.name == "other-object"]
     assert told.grasps[0] == 7
-    assert "is it another object?" in told.words
+    assert "is it another object" in told.words
 
 
 @pytest.mark.long
