@@ -134,9 +134,8 @@ def weighting_table(clock: Clock | None = None, *, particles: int = PARTICLES, r
 
 
 def _grid_note(grid: FieldGrid) -> str:
-    table = grid.interleave()
     nodes = " x ".join(map(str, grid.values_m.shape))
-    return f"once a grasp, {nodes} nodes of {1e3 * grid.spacing_m:g} mm, {table.nbytes / 1e6:.2f} MB kept"
+    return f"once a grasp, {nodes} nodes of {1e3 * grid.spacing_m:g} mm, {grid.bytes_kept / 1e6:.2f} MB kept"
 
 
 def weighting_case(particles: int = PARTICLES) -> WeightingCase:

@@ -11,6 +11,7 @@ from typing import Any
 from calibration.store.admission import UNCALIBRATED, admit
 from drivers.core.configuration import validate
 from drivers.core.errors import ConfigurationError, EstimationError, InterruptionError
+from drivers.core.installed.extras import require_package
 from drivers.simulation.object_names import MESH_PREFIX
 from drivers.simulation.objects import ObjectModel, check_object
 from sessions.conductor.conductor import Conductor
@@ -99,6 +100,14 @@ def check_request(request: SessionRequest) -> Rig:
     return rig
 
 
+def _require_packages(rig: Rig, request: SessionRequest, attendance: Attendance) -> None:
+    """Raises ConfigurationError where an extra is missing that this session needs."""
+    if rig.description.kind == "simulated" or rig.description.emulated:
+        require_package("mujoco")
+    if _conductor_settings(rig, request).exploration.policy and not attendance.guides:
+        require_package("numba")  # for the rays that policies cast
+
+
 def run_session(request: SessionRequest, progress: Progress, attendance: Attendance = ALONE) -> FinishedSession:
     """Run a session on a rig, and evaluate it.
 
@@ -115,6 +124,7 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
     """
     rig = check_request(request)
     check_calibration(rig)
+    _require_packages(rig, request, attendance)
     overlooked = admit(rig.own_calibrations, rig.installation, allow_uncalibrated=request.allow_uncalibrated)
     slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)
     progress.phase(0, "connect")

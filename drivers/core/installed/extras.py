@@ -15,6 +15,7 @@ from drivers.core.errors import ConfigurationError
 EXTRAS = {
     "mujoco": "sim",
     "coacd": "sim",
+    "numba": "explore",
     "fpdf": "hardware",
     "viser": "view",
     "websockets": "view",

@@ -18,7 +18,6 @@ from scipy.spatial import cKDTree
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays
-from tactile_lab.slam.exploration.first_hits import first_hits
 from tactile_lab.slam.exploration.policy import Belief, Surface
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.tracking.contacts.motion import compose, inverse, pose_vector
@@ -135,6 +134,8 @@ def expected_touches(candidates: Sequence[Candidate], belief: Belief, worlds: Po
     A fingertip's centre comes to rest on the surface moved outward by its radius, which all candidates share, and
     touches the place that this part of it was moved from.
     """
+    from tactile_lab.slam.exploration.first_hits import first_hits  # here: compiled loops load slowly
+
     fingers = worlds.finger_errors_m.shape[1]
     padded = [_pad(candidate.rays, fingers) for candidate in candidates]
     starts, ways, longest = (np.array(parts) for parts in zip(*padded, strict=True))

@@ -50,7 +50,6 @@ class FieldGrid:
         self.lower_m, self.spacing_m, self.values_m = lower_m, spacing_m, values_m
         self._gradient_columns = None if gradients is None else list(np.ascontiguousarray(gradients.T))
         self._variances_m2 = variances_m2
-        self._interleaved: Array | None = None
 
     @classmethod
     def tabulate(
@@ -122,18 +121,12 @@ class FieldGrid:
             spread = _interpolate(_tabulate(self._variances_m2, "variances"), corners)
         return Prediction(mean, slope, spread)
 
-    def interleave(self) -> Array:
-        """Value, gradient and variance node by node, shape (nodes, 2 + d), so that a cell's numbers are close in
-        memory.
-
-        Raises:
-            ShapeError: the grid was tabulated without gradients or variances.
-        """
-        if self._interleaved is None:
-            columns = _tabulate(self._gradient_columns, "gradients")
-            variances = _tabulate(self._variances_m2, "variances")
-            self._interleaved = np.column_stack([self.values_m.ravel(), *columns, variances])
-        return self._interleaved
+    @property
+    def bytes_kept(self) -> int:
+        """Size of its tables."""
+        columns = [self.values_m, *(self._gradient_columns or [])]
+        columns += [] if self._variances_m2 is None else [self._variances_m2]
+        return sum(column.nbytes for column in columns)
 
     def _locate(self, points_m: Array) -> tuple[list[tuple[Indices, Array]], Array]:
         """Node index and weight of the corners of each point's cell, and the distance of outer points to the grid.

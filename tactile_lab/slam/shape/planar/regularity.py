@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.shape.planar.runs import chi_square_at, fit_direction, most_gained, turn_back
 from tactile_lab.slam.shape.planar.segmentation import Faces, PlanarContacts
 from tactile_lab.slam.shape.regularities import offsets_of_faces
 
@@ -63,10 +64,6 @@ def _alone(contacts: PlanarContacts, faces: Faces, face: int) -> _Group:
 
 def _most_gained(groups: list[_Group]) -> tuple[float, int, int] | None:
     """The largest gain in chi-square by letting two groups share a direction, and these two; None if there is none."""
-    from tactile_lab.slam.shape.planar.runs import (
-        most_gained,
-    )  # here: compiled loops load slowly
-
     moments, angles = np.array([group.moments for group in groups]), np.array([group.angle_rad for group in groups])
     sizes = np.array([float(len(group.faces)) for group in groups])
     found = most_gained(moments.reshape(-1, 6), angles, sizes, _LONERS)
@@ -74,11 +71,6 @@ def _most_gained(groups: list[_Group]) -> tuple[float, int, int] | None:
 
 
 def _join(one: _Group, other: _Group) -> _Group:
-    from tactile_lab.slam.shape.planar.runs import (
-        fit_direction,
-        turn_back,
-    )  # here: compiled loops load slowly
-
     turns = round((other.angle_rad - one.angle_rad) / _QUARTER_rad)
     moments = one.moments + turn_back(other.moments, turns)
     turned = tuple(turn + turns for turn in other.turns)
@@ -86,10 +78,6 @@ def _join(one: _Group, other: _Group) -> _Group:
 
 
 def _assemble(contacts: PlanarContacts, faces: Faces, groups: list[_Group]) -> Faces:
-    from tactile_lab.slam.shape.planar.runs import (
-        chi_square_at,
-    )  # here: compiled loops load slowly
-
     directions = np.array(faces.directions_rad)
     numbers = np.empty(faces.count, dtype=np.int64)
     for number, group in enumerate(groups):

@@ -2,72 +2,70 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 
 from drivers.core.contacts import Array
-from tactile_lab.slam.compiled import compile_when_called
 
 _NEWTON_STEPS = 12
 _LARGEST_TURN_rad = 0.3
+_SETTLED_rad = 1e-9
 
 
-@compile_when_called
-def fit_direction(xx: float, xy: float, yy: float, gx: float, gy: float) -> float:
+def fit_direction(xx: Any, xy: Any, yy: Any, gx: Any, gy: Any) -> Any:
     """The angle a of ``u = (cos a, sin a)`` that makes ``u' S u - 2 u' g`` least, near the direction of g.
 
     S = [[xx, xy], [xy, yy]] is the weighted scatter of the points, g the weighted sum of the normals, so that this
-    is the chi-square of a line with the normal u, up to a constant.
+    is the chi-square of a line with the normal u, up to a constant. Arrays of one shape, or numbers.
     """
     angle = np.arctan2(gy, gx)
+    going = np.ones(np.shape(angle), dtype=bool)
     for _ in range(_NEWTON_STEPS):
         c, s = np.cos(angle), np.sin(angle)
         slope = (yy - xx) * c * s + xy * (c * c - s * s) + gx * s - gy * c
         along = gx * c + gy * s
-        curvature = max((yy - xx) * (c * c - s * s) - 4 * xy * c * s + along, abs(along), 1e-9)
-        turn = min(max(slope / curvature, -_LARGEST_TURN_rad), _LARGEST_TURN_rad)
-        angle -= turn
-        if abs(turn) < 1e-9:
+        curvature = np.maximum(np.maximum((yy - xx) * (c * c - s * s) - 4 * xy * c * s + along, np.abs(along)), 1e-9)
+        turn = np.where(going, np.clip(slope / curvature, -_LARGEST_TURN_rad, _LARGEST_TURN_rad), 0.0)
+        angle = angle - turn
+        going &= np.abs(turn) >= _SETTLED_rad
+        if not going.any():
             break
-    return float(angle)
+    return angle
 
 
-@compile_when_called
-def chi_square_at(angle: float, moments: Array) -> float:
+def chi_square_at(angle: Any, moments: Array) -> Any:
     """Chi-square of faces for a given direction of the unit normal.
 
     Args:
-        angle: of the normal, radians.
-        moments: xx, xy, yy, gx, gy as in :func:`fit_direction`, and the constant that it leaves out.
+        angle: of the normal, radians; of one face, or an array.
+        moments: xx, xy, yy, gx, gy as in :func:`fit_direction`, and the constant that it leaves out, shape (..., 6).
     """
     c, s = np.cos(angle), np.sin(angle)
-    scatter = moments[0] * c * c + 2 * moments[1] * c * s + moments[2] * s * s
-    return float(scatter - 2 * (moments[3] * c + moments[4] * s) + moments[5])
+    xx, xy, yy, gx, gy, constant = np.moveaxis(moments, -1, 0)
+    return xx * c * c + 2 * xy * c * s + yy * s * s - 2 * (gx * c + gy * s) + constant
 
 
-@compile_when_called
-def direction_variance(angle: float, moments: Array) -> float:
+def direction_variance(angle: Any, moments: Array) -> Any:
     """Variance of the best direction of faces, square radians; arguments as of :func:`chi_square_at`."""
     c, s = np.cos(angle), np.sin(angle)
-    across = moments[0] * s * s - 2 * moments[1] * c * s + moments[2] * c * c
-    return float(1 / (across + c * moments[3] + s * moments[4]))
+    xx, xy, yy, gx, gy, _ = np.moveaxis(moments, -1, 0)
+    across = xx * s * s - 2 * xy * c * s + yy * c * c
+    return 1 / (across + c * gx + s * gy)
 
 
-@compile_when_called
-def turn_back(moments: Array, turns: int) -> Array:
-    """The moments of the same faces for a direction rotated back by this many quarter turns."""
-    xx, xy, yy, gx, gy, constant = moments
-    if turns % 2:
-        xx, xy, yy = yy, -xy, xx
-    for _ in range(turns % 4):
-        gx, gy = gy, -gx
-    return np.array([xx, xy, yy, gx, gy, constant])
+def turn_back(moments: Array, turns: Any) -> Array:
+    """The moments of the same faces for a direction rotated back by this many quarter turns; arrays, or one face."""
+    xx, xy, yy, gx, gy, constant = np.moveaxis(moments, -1, 0)
+    odd, quarters = np.mod(turns, 2) == 1, np.mod(turns, 4)
+    turned = [np.where(odd, yy, xx), np.where(odd, -xy, xy), np.where(odd, xx, yy)]
+    turned += [np.choose(quarters, [gx, gy, -gx, -gy]), np.choose(quarters, [gy, -gx, -gy, gx])]
+    return np.stack([*turned, constant], axis=-1)
 
 
-@compile_when_called
 def most_gained(moments: Array, angles: Array, sizes: Array, loners: float) -> tuple[float, int, int]:
     """The two groups of faces that gain most chi-square by sharing one direction up to quarter turns.
 
@@ -84,27 +82,26 @@ def most_gained(moments: Array, angles: Array, sizes: Array, loners: float) -> t
     Returns:
         The gain, zero if there is none, and the two groups, the earlier one first.
     """
-    quarter, best, pair = np.pi / 2, 0.0, (0, 0)
-    for second in range(len(angles)):
-        for first in range(second):
-            turned = turn_back(moments[second], int(np.rint((angles[second] - angles[first]) / quarter)))
-            both = moments[first] + turned
-            together = chi_square_at(fit_direction(both[0], both[1], both[2], both[3], both[4]), both)
-            apart = chi_square_at(angles[first], moments[first]) + chi_square_at(angles[second], moments[second])
-            variance = direction_variance(angles[first], moments[first])
-            variance += direction_variance(angles[second], moments[second])
-            narrowing = np.log(max(quarter / np.sqrt(2 * np.pi * variance), 1.0))
-            one, other = sizes[first], sizes[second]
-            grouping = math.lgamma(one + other) - math.lgamma(one) - math.lgamma(other) - np.log(loners)
-            gain = 2 * (narrowing + grouping) - (together - apart)
-            if gain > best:
-                best, pair = gain, (first, second)
-    return best, pair[0], pair[1]
+    second, first = np.tril_indices(len(angles), -1)
+    if not len(first):
+        return 0.0, 0, 0
+    quarter = np.pi / 2
+    turns = np.rint((angles[second] - angles[first]) / quarter).astype(np.int64)
+    both = moments[first] + turn_back(moments[second], turns)
+    together = chi_square_at(fit_direction(*both[:, :5].T), both)
+    alone, variances = chi_square_at(angles, moments), direction_variance(angles, moments)
+    narrowing = quarter / np.sqrt(2 * np.pi * (variances[first] + variances[second]))
+    grouping = gammaln(sizes[first] + sizes[second]) - gammaln(sizes[first]) - gammaln(sizes[second])
+    gains = 2 * (np.log(np.fmax(narrowing, 1.0)) + grouping - np.log(loners))
+    gains -= together - alone[first] - alone[second]
+    best = int(np.argmax(gains))
+    if not gains[best] > 0:
+        return 0.0, 0, 0
+    return float(gains[best]), int(first[best]), int(second[best])
 
 
-@compile_when_called
 def run_costs(points: Array, normals: Array, point_weights: Array, normal_weights: Array) -> tuple[Array, Array, Array]:
-    """Chi-square, direction and offset of every run of successive contacts as one face, in O(n^2).
+    """Chi-square, direction and offset of every run of successive contacts as one face.
 
     Args:
         points: contacts in their order along the outline, shape (n, 2); near the origin, for the sums' accuracy.
@@ -114,26 +111,33 @@ def run_costs(points: Array, normals: Array, point_weights: Array, normal_weight
     Returns:
         Three arrays of shape (n, n); entry (i, j), j >= i, is the run of the contacts i to j.
     """
-    n = len(points)
-    costs, angles, offsets = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n))
-    for i in range(n):
-        w = sx = sy = sxx = sxy = syy = gx = gy = h = 0.0
-        for j in range(i, n):
-            x, y, v = points[j, 0], points[j, 1], point_weights[j]
-            w, sx, sy = w + v, sx + v * x, sy + v * y
-            sxx, sxy, syy = sxx + v * x * x, sxy + v * x * y, syy + v * y * y
-            h += normal_weights[j]
-            gx, gy = gx + normal_weights[j] * normals[j, 0], gy + normal_weights[j] * normals[j, 1]
-            xx, xy, yy = sxx - sx * sx / w, sxy - sx * sy / w, syy - sy * sy / w
-            angle = fit_direction(xx, xy, yy, gx, gy)
-            c, s = np.cos(angle), np.sin(angle)
-            misfit = xx * c * c + 2 * xy * c * s + yy * s * s + 2 * h - 2 * (gx * c + gy * s)
-            costs[i, j], angles[i, j], offsets[i, j] = max(misfit, 0.0), angle, (sx * c + sy * s) / w
+    (x, y), v, h = points.T, point_weights, normal_weights
+    terms = [v, v * x, v * y, v * x * x, v * x * y, v * y * y, h, h * normals[:, 0], h * normals[:, 1]]
+    begin, end = np.triu_indices(len(points))
+    w, sx, sy, sxx, sxy, syy, h, gx, gy = _sums_of_runs(terms)[begin, end].T
+    xx, xy, yy = sxx - sx * sx / w, sxy - sx * sy / w, syy - sy * sy / w
+    angle = fit_direction(xx, xy, yy, gx, gy)
+    c, s = np.cos(angle), np.sin(angle)
+    misfit = xx * c * c + 2 * xy * c * s + yy * s * s + 2 * h - 2 * (gx * c + gy * s)
+    costs, angles, offsets = np.zeros((3, len(points), len(points)))
+    costs[begin, end], angles[begin, end] = np.maximum(misfit, 0.0), angle
+    offsets[begin, end] = (sx * c + sy * s) / w
     return costs, angles, offsets
 
 
-@compile_when_called
-def cheapest_division(costs: Array, price: float) -> tuple[float, NDArray[Any]]:
+def _sums_of_runs(terms: Sequence[Array]) -> Array:
+    """Sums of some terms over every run, shape (n, n, terms), each from its first member on: differences of sums from
+    the beginning would be less accurate.
+    """
+    rows = np.column_stack(terms)
+    sums, so_far = np.zeros((len(rows), *rows.shape)), np.zeros_like(rows)
+    for j, row in enumerate(rows):
+        so_far[: j + 1] += row
+        sums[: j + 1, j] = so_far[: j + 1]
+    return sums
+
+
+def cheapest_division(costs: Array, price: float) -> tuple[float, NDArray[np.int64]]:
     """Divide 0..n-1 into runs with the least total cost, where each run costs an additional ``price`` (dynamic
     programming).
 
@@ -141,12 +145,9 @@ def cheapest_division(costs: Array, price: float) -> tuple[float, NDArray[Any]]:
         The total, and the first member of the last run for every prefix, shape (n + 1,).
     """
     n = len(costs)
-    best = np.full(n + 1, np.inf)
-    first = np.zeros(n + 1, np.int64)
-    best[0] = 0.0
+    best, first = np.zeros(n + 1), np.zeros(n + 1, np.int64)
     for j in range(1, n + 1):
-        for i in range(j):
-            total = best[i] + costs[i, j - 1] + price
-            if total < best[j]:
-                best[j], first[j] = total, i
-    return best[n], first
+        totals = best[:j] + costs[:j, j - 1] + price
+        first[j] = np.argmin(totals)
+        best[j] = totals[first[j]]
+    return float(best[n]), first

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.planar.runs import cheapest_division, run_costs
 from tactile_lab.slam.shape.surfaces.sampling import polygon_area, sample_polygon
 
 PARAMETERS_PER_FACE = 3
@@ -221,10 +222,6 @@ def divide(contacts: PlanarContacts, order: NDArray[np.int64]) -> Faces:
 
 
 def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Faces, NDArray[np.int64]]:
-    from tactile_lab.slam.shape.planar.runs import (
-        cheapest_division,
-    )  # here: compiled loops load slowly
-
     costs, angles, offsets = _runs(contacts, order)
     _, firsts = cheapest_division(costs, price_of_face(contacts.point_sigma_m, contacts.normal_sigma_rad))
     borders = [len(order)]
@@ -240,8 +237,6 @@ def _divide_opened(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[
 
 def _runs(contacts: PlanarContacts, order: NDArray[np.int64]) -> tuple[Array, Array, Array]:
     """Chi-square, direction and offset of every run of successive contacts; see :func:`run_costs`."""
-    from tactile_lab.slam.shape.planar.runs import run_costs  # here: compiled loops load slowly
-
     centre = contacts.points_m.mean(axis=0)
     costs, angles, offsets = run_costs(
         np.ascontiguousarray(contacts.points_m[order] - centre),

@@ -1,131 +1,101 @@
-"""Merges contacts into planes from the bottom up, in compiled code: every cluster is represented by its moments."""
+"""Merges contacts into planes from the bottom up: every cluster is represented by its moments."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
-from tactile_lab.slam.compiled import compile_when_called
 
-_NEWTON_STEPS = 10
-_LARGEST_STEP = 0.3
-_SETTLED = 1e-7
+_NEWTON_STEPS = 50
+_SETTLED = 1e-12
+_LEAST_PULL = 1e-9
+
+Indices = NDArray[np.int64]
 
 
-@compile_when_called
-def fit_normal(scatter: Array, pull: Array) -> Array:
-    """The unit vector u that makes ``u' scatter u - 2 u' pull`` least, near the direction of ``pull``.
+def fit_normals(scatters: Array, pulls: Array) -> Array:
+    """The unit vectors u that make ``u' scatter u - 2 u' pull`` least.
 
-    With the weighted scatter of points (3, 3) and the weighted sum of normals (3,) this is, up to a constant, the
-    chi-square of a plane with the normal u. Newton's method on the sphere.
+    With the weighted scatters of points (k, 3, 3) and the weighted sums of normals (k, 3) this is, up to a constant,
+    the chi-square of planes with the normals u.
     """
-    u = pull / np.sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2)
-    first, second = np.empty(3), np.empty(3)
+    axes, _, _, shares = _solve(scatters, pulls)
+    return np.asarray(np.einsum("kij,kj->ki", axes, shares))
+
+
+def _solve(scatters: Array, pulls: Array) -> tuple[Array, Array, Array, Array]:
+    """Principal axes of the scatters, and along them the scatter, the pull and the best unit vector.
+
+    Its components are ``pull / (scatter + shift)``; Newton's method finds the shift that makes their length one, from
+    below, where it converges monotonically (Moré and Sorensen 1983: the trust region's boundary).
+    """
+    spread, axes = np.linalg.eigh(scatters)
+    along = np.einsum("kij,ki->kj", axes, pulls)
+    along[np.abs(along) < _LEAST_PULL] = _LEAST_PULL
+    shift = (np.abs(along) - spread).max(axis=1, keepdims=True, initial=-np.inf)
     for _ in range(_NEWTON_STEPS):
-        least = 0 if abs(u[0]) < 0.6 else 1
-        following, last = (least + 1) % 3, (least + 2) % 3
-        length = np.sqrt(u[following] ** 2 + u[last] ** 2)
-        first[least], first[following], first[last] = 0.0, u[last] / length, -u[following] / length
-        for k in range(3):
-            second[k] = u[(k + 1) % 3] * first[(k + 2) % 3] - u[(k + 2) % 3] * first[(k + 1) % 3]
-        g1 = g2 = h11 = h12 = h22 = along = 0.0
-        for i in range(3):
-            row = su1 = su2 = 0.0
-            for j in range(3):
-                row += scatter[i, j] * u[j]
-                su1 += scatter[i, j] * first[j]
-                su2 += scatter[i, j] * second[j]
-            g1 += first[i] * (row - pull[i])
-            g2 += second[i] * (row - pull[i])
-            along += u[i] * (pull[i] - row)
-            h11 += first[i] * su1
-            h12 += first[i] * su2
-            h22 += second[i] * su2
-        h11, h22 = max(h11 + along, 1e-9), max(h22 + along, 1e-9)
-        if h11 * h22 - h12 * h12 < 1e-6 * h11 * h22:
-            h12 = 0.0
-        determinant = h11 * h22 - h12 * h12
-        d1, d2 = -(h22 * g1 - h12 * g2) / determinant, -(h11 * g2 - h12 * g1) / determinant
-        size = np.sqrt(d1 * d1 + d2 * d2)
-        if size > _LARGEST_STEP:
-            d1, d2 = d1 * _LARGEST_STEP / size, d2 * _LARGEST_STEP / size
-        norm = 0.0
-        for k in range(3):
-            u[k] += d1 * first[k] + d2 * second[k]
-            norm += u[k] * u[k]
-        for k in range(3):
-            u[k] /= np.sqrt(norm)
-        if size < _SETTLED:
+        stiffness = spread + shift
+        shares = along / stiffness
+        squared = shares * shares
+        total = squared.sum(axis=1, keepdims=True)
+        length = np.sqrt(total)
+        if not (length - 1 > _SETTLED).any():
             break
-    return np.asarray(u)
+        shift += (length - 1) * total / (squared / stiffness).sum(axis=1, keepdims=True)
+    return axes, spread, along, shares / length
 
 
-@compile_when_called
-def merged_chi_square(
-    middles: Array, scatters: Array, pulls: Array, point_weights: Array, normal_weights: Array, a: int, b: int
-) -> float:
-    """Chi-square of the plane through two clusters together."""
-    share = point_weights[a] * point_weights[b] / (point_weights[a] + point_weights[b])
-    scatter = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            gap = (middles[a, i] - middles[b, i]) * (middles[a, j] - middles[b, j])
-            scatter[i, j] = scatters[a, i, j] + scatters[b, i, j] + share * gap
-    pull = pulls[a] + pulls[b]
-    u = fit_normal(scatter, pull)
-    chi_square = 2 * (normal_weights[a] + normal_weights[b])
-    for i in range(3):
-        chi_square -= 2 * u[i] * pull[i]
-        for j in range(3):
-            chi_square += u[i] * scatter[i, j] * u[j]
-    return float(chi_square)
+@dataclass(frozen=True)
+class _Moments:
+    """Of clusters of contacts.
+
+    Attributes:
+        middles: weighted mean points, shape (k, 3).
+        scatters: weighted scatters about them, shape (k, 3, 3).
+        pulls: weighted sums of normals, shape (k, 3).
+        point_weights, normal_weights: sums of inverse variances, shape (k,).
+    """
+
+    middles: Array
+    scatters: Array
+    pulls: Array
+    point_weights: Array
+    normal_weights: Array
+
+    def of(self, clusters: Indices) -> _Moments:
+        return _Moments(*(column[clusters] for column in vars(self).values()))
+
+    def with_other(self, other: _Moments) -> _Moments:
+        """Each cluster together with another."""
+        total = self.point_weights + other.point_weights
+        share = self.point_weights * other.point_weights / total
+        gap = self.middles - other.middles
+        return _Moments(
+            (self.point_weights[:, None] * self.middles + other.point_weights[:, None] * other.middles)
+            / total[:, None],
+            self.scatters + other.scatters + share[:, None, None] * gap[:, :, None] * gap[:, None, :],
+            self.pulls + other.pulls,
+            total,
+            self.normal_weights + other.normal_weights,
+        )
+
+    def chi_squares(self) -> Array:
+        """Of the best plane of each cluster, shape (k,)."""
+        _, spread, along, shares = _solve(self.scatters, self.pulls)
+        return np.asarray(2 * self.normal_weights + (shares * (spread * shares - 2 * along)).sum(axis=1))
+
+    def replace(self, cluster: int, other: _Moments) -> None:
+        """Put another cluster into the place of one."""
+        for column, new in zip(vars(self).values(), vars(other).values(), strict=True):
+            column[cluster] = new[0]
 
 
-@compile_when_called
-def _absorb(
-    middles: Array, scatters: Array, pulls: Array, point_weights: Array, normal_weights: Array, a: int, b: int
-) -> None:
-    """Moments of cluster a after it has taken in b."""
-    one, other = point_weights[a], point_weights[b]
-    total = one + other
-    share = one * other / total
-    for i in range(3):
-        for j in range(3):
-            gap = (middles[a, i] - middles[b, i]) * (middles[a, j] - middles[b, j])
-            scatters[a, i, j] += scatters[b, i, j] + share * gap
-    for i in range(3):
-        middles[a, i] = (one * middles[a, i] + other * middles[b, i]) / total
-        pulls[a, i] += pulls[b, i]
-    point_weights[a], normal_weights[a] = total, normal_weights[a] + normal_weights[b]
-
-
-@compile_when_called
-def _dot(a: Array, b: Array) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@compile_when_called
-def _choose_partner(costs: Array, partner: NDArray[np.int64], cheapest: Array, a: int) -> None:
-    """Store the other cluster with which cluster a merges at the least cost."""
-    partner[a] = np.argmin(costs[a])
-    cheapest[a] = costs[a, partner[a]]
-
-
-@compile_when_called
-def _leave_out(costs: Array, cheapest: Array, labels: NDArray[np.int64], a: int, b: int) -> None:
-    """Mark cluster b as part of a, so that it is not merged again."""
-    cheapest[b] = np.inf
-    for c in range(len(labels)):
-        costs[b, c], costs[c, b] = np.inf, np.inf
-        if labels[c] == b:
-            labels[c] = a
-
-
-@compile_when_called
 def merge_clusters(
     points: Array, normals: Array, point_weights: Array, normal_weights: Array, limit: float, least_cosine: float
-) -> NDArray[np.int64]:
+) -> Indices:
     """Merge clusters of contacts, always those two whose common plane increases chi-square least.
 
     Args:
@@ -138,34 +108,32 @@ def merge_clusters(
         The cluster of each contact: the smallest index of its members, shape (n,).
     """
     count = len(points)
-    middles, scatters = points.copy(), np.zeros((count, 3, 3))
-    pulls = normals * normal_weights.reshape(-1, 1)
-    weights, normal_weights = point_weights.copy(), normal_weights.copy()
+    pulls = normals * normal_weights[:, None]
+    moments = _Moments(points.copy(), np.zeros((count, 3, 3)), pulls, point_weights.copy(), normal_weights.copy())
     chi_squares, labels = np.zeros(count), np.arange(count)
     costs = np.full((count, count), np.inf)
-    partner, cheapest = np.zeros(count, np.int64), np.zeros(count)
-    for a in range(count):
-        for b in range(a + 1, count):
-            if _dot(normals[a], normals[b]) > least_cosine:
-                costs[a, b] = merged_chi_square(middles, scatters, pulls, weights, normal_weights, a, b)
-                costs[b, a] = costs[a, b]
-    for a in range(count):
-        _choose_partner(costs, partner, cheapest, a)
-    first = np.argmin(cheapest)
-    while cheapest[first] <= limit:
-        a, b = min(first, partner[first]), max(first, partner[first])
-        chi_squares[a] = merged_chi_square(middles, scatters, pulls, weights, normal_weights, a, b)
-        _absorb(middles, scatters, pulls, weights, normal_weights, a, b)
-        _leave_out(costs, cheapest, labels, a, b)
-        for c in range(count):
-            if c != a and labels[c] == c:
-                cost = np.inf
-                cosine = _dot(pulls[a], pulls[c]) / np.sqrt(_dot(pulls[a], pulls[a]) * _dot(pulls[c], pulls[c]))
-                if cosine > least_cosine:
-                    both = merged_chi_square(middles, scatters, pulls, weights, normal_weights, a, c)
-                    cost = both - chi_squares[a] - chi_squares[c]
-                costs[a, c], costs[c, a] = cost, cost
-                _choose_partner(costs, partner, cheapest, c)
-        _choose_partner(costs, partner, cheapest, a)
-        first = np.argmin(cheapest)
+    one, other = np.nonzero(np.triu(normals @ normals.T > least_cosine, 1))
+    costs[one, other] = costs[other, one] = moments.of(one).with_other(moments.of(other)).chi_squares()
+    while count:
+        a, b = sorted(divmod(int(np.argmin(costs)), count))
+        if not costs[a, b] <= limit:
+            break
+        moments.replace(a, moments.of(np.array([a])).with_other(moments.of(np.array([b]))))
+        chi_squares[a] += costs[a, b] + chi_squares[b]
+        labels[labels == b] = a
+        costs[[a, b]] = costs[:, [a, b]] = np.inf
+        _weigh_mergers(costs, moments, chi_squares, labels, a, least_cosine)
     return labels
+
+
+def _weigh_mergers(
+    costs: Array, moments: _Moments, chi_squares: Array, labels: Indices, a: int, least_cosine: float
+) -> None:
+    """Costs of merging cluster a with each of the others whose mean normals are near its own."""
+    lengths = np.sqrt(np.einsum("ki,ki->k", moments.pulls, moments.pulls))
+    near = moments.pulls @ moments.pulls[a] > least_cosine * lengths * lengths[a]
+    near &= labels == np.arange(len(labels))
+    near[a] = False
+    others = np.flatnonzero(near)
+    both = moments.of(others).with_other(moments.of(np.full(len(others), a)))
+    costs[a, others] = costs[others, a] = both.chi_squares() - chi_squares[a] - chi_squares[others]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.observations import check_contacts
+from tactile_lab.slam.shape.solids.merging import fit_normals, merge_clusters
 
 PARAMETERS_PER_PLANE = 4
 """Two angles, the offset, and the choice of its members."""
@@ -67,6 +68,10 @@ class WeightedContacts:
     def __len__(self) -> int:
         return len(self.points_m)
 
+    def of(self, members: NDArray[np.intp]) -> WeightedContacts:
+        """Some of the contacts."""
+        return WeightedContacts(*(column[members] for column in vars(self).values()))
+
     def chi_squares(self, normals: Array, offsets_m: Array) -> Array:
         """Misfit of every contact to every plane, shape (n, S)."""
         misses_m = self.points_m @ normals.T - offsets_m
@@ -107,8 +112,6 @@ def weighted_contacts(
 
 def divide(contacts: WeightedContacts) -> Planes:
     """Merge clusters, reassign single contacts, and dissolve planes that are not worth their parameters."""
-    from tactile_lab.slam.shape.solids.merging import merge_clusters  # imported here, because compiling takes time
-
     price = plane_price(len(contacts))
     columns = contacts.points_m, contacts.normals, contacts.point_weights, contacts.normal_weights
     clusters = merge_clusters(*columns, price, float(np.cos(_LARGEST_ANGLE_rad)))
@@ -132,22 +135,25 @@ def fit_planes(contacts: WeightedContacts, labels: NDArray[np.int64]) -> Planes:
     _, first, label, sizes = np.unique(labels, return_index=True, return_inverse=True, return_counts=True)
     order = np.lexsort((first, -sizes))
     label = np.argsort(order)[label]
-    fitted = [fit_plane(contacts, np.flatnonzero(label == k)) for k in range(len(order))]
-    normals, offsets_m = np.array([u for u, _ in fitted]), np.array([offset for _, offset in fitted])
+    normals, offsets_m = _best_planes(contacts, label, len(order))
     chi_square = contacts.chi_squares(normals, offsets_m)[np.arange(len(contacts)), label].sum()
     return Planes(label.astype(np.int64), normals, offsets_m, float(chi_square))
 
 
-def fit_plane(contacts: WeightedContacts, members: NDArray[np.intp]) -> tuple[Array, float]:
-    """Normal and offset of the plane of least chi-square through some contacts."""
-    from tactile_lab.slam.shape.solids.merging import fit_normal
+def _best_planes(contacts: WeightedContacts, label: NDArray[np.int64], count: int) -> tuple[Array, Array]:
+    """Normals (k, 3) and offsets (k,) of the planes of least chi-square through the contacts of each label."""
+    weights = contacts.point_weights[:, None]
+    middles = _sums(label, weights * contacts.points_m, count) / _sums(label, weights, count)
+    arms = contacts.points_m - middles[label]
+    scatters = _sums(label, weights[..., None] * arms[:, :, None] * arms[:, None, :], count)
+    normals = fit_normals(scatters, _sums(label, contacts.normal_weights[:, None] * contacts.normals, count))
+    return normals, np.einsum("ki,ki->k", normals, middles)
 
-    weights = contacts.point_weights[members]
-    middle = np.average(contacts.points_m[members], axis=0, weights=weights)
-    arms = contacts.points_m[members] - middle
-    pull = contacts.normal_weights[members] @ contacts.normals[members]
-    normal = fit_normal(np.ascontiguousarray((arms.T * weights) @ arms), pull)
-    return normal, float(normal @ middle)
+
+def _sums(label: NDArray[np.int64], terms: Array, count: int) -> Array:
+    sums = np.zeros((count, *terms.shape[1:]))
+    np.add.at(sums, label, terms)
+    return sums
 
 
 def _reassign(contacts: WeightedContacts, planes: Planes) -> NDArray[np.int64]:
@@ -184,8 +190,8 @@ def _dissolve(contacts: WeightedContacts, planes: Planes, price: float) -> Plane
 def _joining_cost(contacts: WeightedContacts, planes: Planes, costs: Array, plane: int, host: int) -> float:
     """Chi-square added by replacing two planes with one."""
     both = np.flatnonzero((planes.labels == plane) | (planes.labels == host))
-    normal, offset_m = fit_plane(contacts, both)
-    together = contacts.chi_squares(normal[None], np.array([offset_m]))[both, 0].sum()
+    members = contacts.of(both)
+    together = members.chi_squares(*_best_planes(members, np.zeros(len(both), np.int64), 1)).sum()
     return float(together - costs[both, planes.labels[both]].sum())
 
 

@@ -1,4 +1,4 @@
-"""The inner loops of the trajectory's likelihood, compiled.
+"""The inner sums of the trajectory's likelihood, over all pairs of contacts at once.
 
 Rows and columns of the matrices are ordered as in :func:`tactile_lab.slam.shape.fields.kernels.covariance`: all values,
 then the gradients' first components, then their second ones, and so on. Differences are ``d = p_a - p_b``.
@@ -9,12 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from drivers.core.contacts import Array
-from tactile_lab.slam.compiled import compile_when_called
 
 
-@compile_when_called
 def assemble(points: Array, value: Array, first: Array, second: Array, noise_variance: Array, jitter: float) -> Array:
-    """Covariance of values and gradients at all points with noise on its diagonal; only the upper triangle is filled.
+    """Covariance of values and gradients at all points with noise on its diagonal; only the upper triangle counts.
 
     Args:
         points: shape (n, d).
@@ -24,23 +22,21 @@ def assemble(points: Array, value: Array, first: Array, second: Array, noise_var
     """
     n, dimension = points.shape
     matrix = np.empty((n * (dimension + 1), n * (dimension + 1)))
-    for a in range(n):
-        for b in range(n):
-            slope, bend = -2.0 * first[a, b], -4.0 * second[a, b]
-            matrix[a, b] = value[a, b]
-            for j in range(dimension):
-                delta_j = points[a, j] - points[b, j]
-                column = n + j * n + b
-                matrix[a, column] = slope * delta_j
-                for i in range(j):
-                    matrix[n + i * n + a, column] = bend * (points[a, i] - points[b, i]) * delta_j
-                matrix[n + j * n + a, column] = bend * delta_j * delta_j + slope
-    for row in range(len(matrix)):
-        matrix[row, row] += jitter * matrix[row, row] + noise_variance[row]
+    blocks = matrix.reshape(dimension + 1, n, dimension + 1, n)
+    deltas = _differences(points)
+    slope = -2.0 * first
+    bends = (-4.0 * second) * deltas
+    blocks[0, :, 0] = value
+    for j, delta in enumerate(deltas, 1):
+        np.multiply(slope, delta, out=blocks[0, :, j])
+        for i in range(j):
+            np.multiply(bends[i], delta, out=blocks[i + 1, :, j])
+        blocks[j, :, j] += slope
+    diagonal = np.einsum("ii->i", matrix)
+    diagonal += jitter * diagonal + noise_variance
     return matrix
 
 
-@compile_when_called
 def pull(points: Array, first: Array, second: Array, third: Array, inverse: Array, weights: Array) -> Array:
     """Derivative by each point of ``sum((inverse - weights weights^T) * K) / 2``, K as in :func:`assemble`.
 
@@ -50,43 +46,35 @@ def pull(points: Array, first: Array, second: Array, third: Array, inverse: Arra
     Args:
         points: shape (n, d).
         first, second, third: derivatives of the kernel's profile for all pairs, shape (n, n).
-        inverse: of the covariance; only its lower triangle is read.
+        inverse: the lower triangle of the covariance's inverse, zero above it.
         weights: the covariance's inverse times the residuals.
 
     Returns:
         Shape (n, d).
     """
     n, dimension = points.shape
-    result = np.zeros((n, dimension))
-    delta, cross, turned = np.empty(dimension), np.empty(dimension), np.empty(dimension)
-    for a in range(n):
-        for b in range(a):
-            on_value = inverse[a, b] - weights[a] * weights[b]
-            linear, trace, quadratic = 0.0, 0.0, 0.0
-            for i in range(dimension):
-                delta[i] = points[a, i] - points[b, i]
-                row, other = n + i * n + a, n + i * n + b
-                cross[i] = inverse[row, b] - weights[row] * weights[b] - inverse[other, a] + weights[other] * weights[a]
-                linear += cross[i] * delta[i]
-                trace += inverse[row, other] - weights[row] * weights[other]
-            for i in range(dimension):
-                turned[i] = 0.0
-                for j in range(dimension):
-                    turned[i] += (points[a, j] - points[b, j]) * (
-                        _symmetric(inverse, n + i * n + a, n + j * n + b)
-                        + _symmetric(inverse, n + j * n + a, n + i * n + b)
-                        - weights[n + i * n + a] * weights[n + j * n + b]
-                        - weights[n + j * n + a] * weights[n + i * n + b]
-                    )
-                quadratic += 0.5 * turned[i] * delta[i]
-            radial = on_value * first[a, b] + 2.0 * (linear - trace) * second[a, b] - 4.0 * quadratic * third[a, b]
-            for i in range(dimension):
-                slope = 2.0 * delta[i] * radial + 2.0 * cross[i] * first[a, b] - 4.0 * turned[i] * second[a, b]
-                result[a, i] += slope
-                result[b, i] -= slope
-    return result
+    deltas = _differences(points)
+    factor = inverse + inverse.T
+    np.einsum("ii->i", factor)[:] *= 0.5
+    factor -= np.multiply.outer(weights, weights)
+    blocks = factor.reshape(dimension + 1, n, dimension + 1, n)
+    linear, trace = np.zeros((n, n)), np.zeros((n, n))
+    cross, turned = np.empty_like(deltas), np.zeros_like(deltas)
+    for i, delta in enumerate(deltas):
+        np.subtract(blocks[i + 1, :, 0], blocks[i + 1, :, 0].T, out=cross[i])
+        linear += cross[i] * delta
+        trace += blocks[i + 1, :, i + 1]
+        turned[i] += 2.0 * delta * blocks[i + 1, :, i + 1]
+        for j in range(i):
+            both = blocks[i + 1, :, j + 1] + blocks[j + 1, :, i + 1]
+            turned[i] += deltas[j] * both
+            turned[j] += delta * both
+    quadratic = np.einsum("iab,iab->ab", turned, deltas)
+    radial = blocks[0, :, 0] * first + 2.0 * (linear - trace) * second - 2.0 * quadratic * third
+    slopes = 2.0 * (deltas * radial + cross * first) - 4.0 * turned * second
+    return np.ascontiguousarray(slopes.sum(axis=2).T)
 
 
-@compile_when_called
-def _symmetric(lower: Array, row: int, column: int) -> float:
-    return float(lower[row, column] if row >= column else lower[column, row])
+def _differences(points: Array) -> Array:
+    """Shape (d, n, n)."""
+    return np.asarray(points.T[:, :, None] - points.T[:, None, :])

@@ -28,6 +28,7 @@ from tactile_lab.slam.shape.fields.priors import PriorMean
 from tactile_lab.slam.shape.fields.settings import initial_kernel, observe, prior_mean
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.evidence.evidence_kernels import assemble, pull
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 
 _JITTER = 1e-9
@@ -172,8 +173,6 @@ class PoseEvidence:
         return self._last[1]
 
     def _compute(self, rows: Array) -> _Placed:
-        from tactile_lab.slam.tracking.evidence.evidence_kernels import assemble  # compiled loops are slow to import
-
         points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
         squared = _squared_distances(points)
         phi = self._kernel.profile(squared)
@@ -188,8 +187,6 @@ class PoseEvidence:
 
     def _by_contacts(self, rows: Array, placed: _Placed) -> Array:
         """Derivative of the misfit by the pose of each contact's grasp, shape (n, size)."""
-        from tactile_lab.slam.tracking.evidence.evidence_kernels import pull  # compiled loops are slow to import
-
         points, normals, weights, phi = placed.points, placed.normals, placed.weights, placed.phi
         count, dimension = points.shape
         by_normals = np.ascontiguousarray(weights[count:].reshape(dimension, count).T)

@@ -12,6 +12,8 @@ import pytest
 from drivers.core.errors import ConfigurationError
 from drivers.core.installed import extras
 from drivers.core.installed.extras import EXTRAS, LazyPackage, explain_missing, require_package
+from sessions.conductor.progress import NullProgress
+from tactile_lab.workflow.running import SessionRequest, run_session
 
 REPOSITORY = Path(__file__).resolve().parents[5]
 COMMAND = r"is not installed\. Install it: python3 -m pip --python .* install 'tactile-lab\[absent\]'$"
@@ -75,4 +77,12 @@ def test_the_base_needs_no_package_of_an_extra_and_the_simulated_rig_names_its_o
     assert done.returncode == 2, done.stderr
     assert "the package mujoco of the extra [sim] is not installed" in done.stderr
     assert "Traceback" not in done.stderr
+    assert not (tmp_path / "runs").exists()
+
+
+def test_a_policy_names_the_extra_that_it_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    find = extras.find_spec
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "numba" else find(name))
+    with pytest.raises(ConfigurationError, match=r"numba of the extra \[explore\]"):
+        run_session(SessionRequest("sim", "box-10x6x4", tmp_path / "runs", policy="information"), NullProgress())
     assert not (tmp_path / "runs").exists()
