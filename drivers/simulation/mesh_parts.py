@@ -9,7 +9,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import trimesh
-from skimage.measure import marching_cubes
 
 from drivers.core.contacts import Array
 
@@ -37,13 +36,16 @@ def _contains(mesh: trimesh.Trimesh, places_m: Array) -> bool:
 
 def outer_surface(parts: Sequence[trimesh.Trimesh]) -> list[trimesh.Trimesh]:
     """The bodies that parts enclose, merged where they meet; edges lose a fraction of a millimetre."""
+    import igl  # here, so that importing this module stays quick
+
     mesh: trimesh.Trimesh = trimesh.util.concatenate(list(parts))  # type: ignore[assignment]
     step_m = max(_FINEST_m, float(np.sqrt(mesh.area / _CELLS_ON_SURFACE)))
     axes = [np.arange(low - 1.5 * step_m, high + 2 * step_m, step_m) for low, high in mesh.bounds.T]
     nodes_m = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     outside_m = _distances_m(mesh, nodes_m.reshape(-1, 3)).reshape(nodes_m.shape[:3])
-    vertices, faces, _, _ = marching_cubes(outside_m, 0.0, spacing=(step_m,) * 3)  # type: ignore[no-untyped-call]
-    merged = trimesh.Trimesh(vertices + nodes_m[0, 0, 0], faces)
+    ordered = outside_m.T.ravel(), nodes_m.transpose(2, 1, 0, 3).reshape(-1, 3)  # the first axis runs fastest
+    vertices, faces, _ = igl.marching_cubes(*ordered, *outside_m.shape, 0.0)
+    merged = trimesh.Trimesh(vertices, faces)
     if merged.volume < 0:
         merged.invert()
     return [body for body in merged.split(only_watertight=True) if body.volume > 0]

@@ -20,7 +20,7 @@ from tests.mutants.mutations import Mutation
 # Loaded once, not in every run.
 LIBRARIES = (
     "cv2", "gtsam", "h5py", "hypothesis", "mujoco", "numba", "pydantic", "rich.progress", "scipy.interpolate",
-    "scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "skimage.measure", "trimesh", "typer", "yaml",
+    "scipy.ndimage", "scipy.optimize", "scipy.spatial", "scipy.stats", "trimesh", "typer", "yaml",
 )  # fmt: skip
 # What does nothing for so many times its limit is ended.
 _WAITING = 10

@@ -10,9 +10,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import trimesh
-from skimage.measure import marching_cubes
 
 from drivers.simulation.objects import prism_mesh
+from tactile_lab.slam.shape.surfaces.level_sets import level_mesh
 
 Distance: TypeAlias = Callable[[Any, Any, Any], Any]
 """Approximate signed distance from a solid at coordinates x, y and z, negative inside, metres."""
@@ -28,8 +28,8 @@ def surface_of(distance: Distance, lower_m: tuple[float, ...], upper_m: tuple[fl
     axes = [np.arange(low, high, _GRID_m) for low, high in zip(lower_m, upper_m, strict=True)]
     values = distance(*np.meshgrid(*axes, indexing="ij"))
     values[np.abs(values) < _OFF_NODE_m] = _OFF_NODE_m
-    vertices, faces, _, _ = marching_cubes(values, 0.0, spacing=(_GRID_m,) * 3)  # type: ignore[no-untyped-call]
-    mesh = trimesh.Trimesh(vertices + [axis[0] for axis in axes], faces)
+    places, faces = level_mesh(values)
+    mesh = trimesh.Trimesh(_GRID_m * places + [axis[0] for axis in axes], faces)
     if mesh.volume < 0:
         mesh.invert()
     return mesh

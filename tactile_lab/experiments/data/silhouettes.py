@@ -7,9 +7,9 @@ from typing import TypeAlias
 import numpy as np
 import trimesh
 from scipy.ndimage import binary_closing
-from skimage.measure import approximate_polygon, find_contours
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.shape.surfaces.level_sets import level_outlines, without_small_bends
 from tactile_lab.slam.shape.surfaces.sampling import sample_mesh_with_normals
 
 VIEWS = {"front": (0, 2), "above": (0, 1)}
@@ -44,8 +44,8 @@ def _outlines(points_mm: Array) -> Lines:
     filled = np.zeros(indices.max(axis=0) + _BORDER + 1, dtype=bool)
     filled[tuple(indices.T)] = True
     filled = binary_closing(filled, np.ones((2 * _CLOSED + 1,) * 2, dtype=bool))
-    found = find_contours(filled.astype(float), _THROUGH_PIXELS)  # type: ignore[no-untyped-call]
-    lines = [approximate_polygon(line, _TOLERANCE_mm / _PIXEL_mm) for line in found]  # type: ignore[no-untyped-call]
+    found = [np.vstack([line, line[:1]]) for line in level_outlines(_THROUGH_PIXELS - filled)]
+    lines = [without_small_bends(line, _TOLERANCE_mm / _PIXEL_mm) for line in found]
     return [_rounded(low + _PIXEL_mm * line) for line in lines if len(line) > 3]
 
 

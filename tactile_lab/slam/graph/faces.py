@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
+from tactile_lab.slam.shape.surfaces.level_sets import without_small_bends
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 
 Labels = NDArray[np.int64]
@@ -57,11 +58,9 @@ def contour_segments(contour_m: Array, settings: FaceSettings) -> Segments:
 
     Douglas-Peucker needs a point to start from: the one farthest from the centre, most likely a corner.
     """
-    from skimage.measure import approximate_polygon  # here, so that importing this module stays quick
-
     corner = int(np.argmax(np.sum((contour_m - contour_m.mean(axis=0)) ** 2, axis=1)))
     ring = np.roll(contour_m, -corner, axis=0)
-    polygon = approximate_polygon(np.vstack([ring, ring[:1]]), settings.tolerance_m)  # type: ignore[no-untyped-call]
+    polygon = without_small_bends(np.vstack([ring, ring[:1]]), settings.tolerance_m)
     starts, ends = polygon[:-1], polygon[1:]
     along = ends - starts
     lengths = np.linalg.norm(along, axis=1)

@@ -12,6 +12,7 @@ from scipy import ndimage
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.field_grid import LARGEST_NODE_COUNT
+from tactile_lab.slam.shape.surfaces.level_sets import level_mesh, level_outlines
 from tactile_lab.slam.shape.surfaces.sampling import polygon_area
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
@@ -39,12 +40,9 @@ def contour_of(value: Function, lower_m: Array, upper_m: Array, resolution_m: fl
 
 def contour_of_nodes(first_m: Array, nodes: Array, resolution_m: float, sigma: Function) -> Contour:
     """As :func:`contour_of`, from values on a grid whose first node is at ``first_m``."""
-    from skimage.measure import find_contours  # here, so that importing this module stays quick
-
     _check_dimension(first_m, 2)
     body, closed = _one_body(nodes, resolution_m)
-    loops = find_contours(body, 0.0, fully_connected="high")  # type: ignore[no-untyped-call]
-    loop = max(loops, key=lambda each: abs(polygon_area(each)))[:-1]
+    loop = max(level_outlines(body), key=lambda each: abs(polygon_area(each)))
     points = first_m + resolution_m * loop
     points = points if polygon_area(points) > 0 else points[::-1].copy()
     return Contour(points, sigma(points), closed)
@@ -71,14 +69,12 @@ def mesh_of_nodes(
     first_m: Array, nodes: Array, resolution_m: float, sigma: Function, floor_m: float | None = None
 ) -> SurfaceMesh:
     """As :func:`mesh_of`, from values on a grid whose first node is at ``first_m``."""
-    from skimage.measure import marching_cubes  # here, so that importing this module stays quick
-
     _check_dimension(first_m, 3)
     if floor_m is not None:
         nodes = np.maximum(nodes, floor_m - first_m[2] - resolution_m * np.arange(nodes.shape[2]))
     body, closed = _one_body(nodes, resolution_m)
-    places, faces, _, _ = marching_cubes(body, 0.0, gradient_direction="descent", allow_degenerate=False)  # type: ignore[no-untyped-call]
-    vertices, triangles = first_m + resolution_m * places.astype(float), faces.astype(np.int64)
+    places, triangles = level_mesh(body)
+    vertices = first_m + resolution_m * places
     return SurfaceMesh(vertices, triangles, sigma(vertices), vertex_normals(vertices, triangles), closed)
 
 

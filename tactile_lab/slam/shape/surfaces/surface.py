@@ -14,6 +14,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.surfaces.level_sets import level_mesh, level_outlines
 from tactile_lab.slam.shape.surfaces.sampling import polygon_area
 
 Indices: TypeAlias = NDArray[np.int64]
@@ -87,11 +88,8 @@ def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m
     Raises:
         ShapeError: no point near the contacts is inside, or the grid would be too large.
     """
-    from skimage.measure import find_contours  # here, so that importing this module stays quick
-
     solid = _solid(gpis, resolution_m, largest_margin_m)
-    loops = find_contours(solid.values_m, 0.0, fully_connected="high")  # type: ignore[no-untyped-call]
-    places = max(loops, key=lambda loop: abs(polygon_area(loop)))[:-1]
+    places = max(level_outlines(solid.values_m), key=lambda loop: abs(polygon_area(loop)))
     points, _, sigma = _refine(gpis, solid.lower_m + resolution_m * places, resolution_m)
     return _counter_clockwise(Contour(points, sigma, solid.is_closed))
 
@@ -110,13 +108,9 @@ def extract_mesh(
     even if the field continues below. ``ceiling_m`` likewise is the height of a flat top, if any. Both ends have sharp
     rims, and their sigma is :data:`LEVEL_SIGMA_m`.
     """
-    from skimage.measure import marching_cubes  # here, so that importing this module stays quick
-
     solid = _solid(gpis, resolution_m, largest_margin_m).between(floor_m, ceiling_m, resolution_m)
-    places, faces, _, _ = marching_cubes(  # type: ignore[no-untyped-call]
-        solid.values_m, 0.0, gradient_direction="descent", allow_degenerate=False
-    )
-    rough = solid.lower_m + resolution_m * places.astype(float)
+    places, faces = level_mesh(solid.values_m)
+    rough = solid.lower_m + resolution_m * places
     vertices, normals, sigma = _refine(gpis, rough, resolution_m)
     for level_m, side in ((floor_m, -1.0), (ceiling_m, 1.0)):
         if level_m is not None:
@@ -125,7 +119,7 @@ def extract_mesh(
             rim = flat & np.isin(np.arange(len(flat)), faces[~flat[faces].all(axis=1)])
             vertices[rim] = _move_sideways(gpis, vertices[rim], _LARGEST_RIM_STEP * resolution_m)
             normals[flat], sigma[flat] = [0.0, 0.0, side], LEVEL_SIGMA_m
-    return SurfaceMesh(vertices, faces.astype(np.int64), sigma, normals, solid.is_closed)
+    return SurfaceMesh(vertices, faces, sigma, normals, solid.is_closed)
 
 
 @dataclass(frozen=True)
