@@ -44,7 +44,7 @@ def _outlines(points_mm: Array) -> Lines:
     filled = np.zeros(indices.max(axis=0) + _BORDER + 1, dtype=bool)
     filled[tuple(indices.T)] = True
     filled = binary_closing(filled, np.ones((2 * _CLOSED + 1,) * 2, dtype=bool))
-    found = [np.vstack([line, line[:1]]) for line in level_outlines(_THROUGH_PIXELS - filled)]
+    found = [np.vstack([line, line[:1]]) for line in level_outlines(_THROUGH_PIXELS - filled.astype(float))]
     lines = [without_small_bends(line, _TOLERANCE_mm / _PIXEL_mm) for line in found]
     return [_rounded(low + _PIXEL_mm * line) for line in lines if len(line) > 3]
 
