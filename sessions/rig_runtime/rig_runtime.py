@@ -114,7 +114,7 @@ class RigRuntime:
         """Cycles so far, and those that were late."""
         return self._timing.counts
 
-    def tell_problems_to(self, listener: Callable[[str], None]) -> None:
+    def report_problems_to(self, listener: Callable[[str], None]) -> None:
         """Problems of devices are recorded, and from now on also passed to ``listener``, once each."""
         self._state.watch.listener = listener
 

@@ -8,7 +8,7 @@ from drivers.core.contact_checks import touched_one_side
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.slam.doubt.known_part import LARGEST_SIGMA_m
 
-_WORTH_TELLING = 0.1
+_WORTH_A_WARNING = 0.1
 
 
 def result_warnings(results: Results) -> tuple[str, ...]:
@@ -41,4 +41,4 @@ def _warn_of_guesses(results: Results) -> str:
         return ""
     known = results.known_share
     share = float(np.mean(sigma_m > LARGEST_SIGMA_m)) if known is None else 1.0 - known
-    return f"{share:.0%} of the shape is a guess: nothing was touched near it" if share > _WORTH_TELLING else ""
+    return f"{share:.0%} of the shape is a guess: nothing was touched near it" if share > _WORTH_A_WARNING else ""

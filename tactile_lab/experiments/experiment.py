@@ -15,7 +15,6 @@ from tactile_lab.experiments.plot_data import Plot
 from tactile_lab.experiments.summary import Column
 
 REPORTED_SEEDS = tuple(range(1000, 1030))
-DEVELOPMENT_SEEDS = range(100)
 
 PlotOf: TypeAlias = Callable[[Sequence[Row]], Plot]
 

@@ -21,7 +21,7 @@ from drivers.fingertips.wiring import make_wire
 from drivers.force.wire_settings import WireSettings
 from drivers.shadow.device.hand_setup import HandSetup
 from drivers.shadow.model.hand_form import HandForm
-from drivers.shadow.model.hand_info import HandStatement, load_infos, told_form
+from drivers.shadow.model.hand_info import HandStatement, load_infos, stated_form
 from drivers.shadow.protocol.palm_images import USUAL_PALM
 from drivers.simulation.settings import SimulationSettings
 from sessions.perception.interpreter import HAND_LINK
@@ -77,7 +77,7 @@ def hand_form(rig: Rig) -> HandForm:
     stated = rig.description.hand
     where = f"{rig.source}: hand"
     infos = load_infos(rig.files[role] for role in _HAND_FILES if role in rig.files)
-    return told_form(rig.files["motors"], infos, HandStatement(where, stated.side, stated.fingers))
+    return stated_form(rig.files["motors"], infos, HandStatement(where, stated.side, stated.fingers))
 
 
 def with_form(rig: Rig) -> Rig:

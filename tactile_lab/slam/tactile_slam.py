@@ -54,8 +54,8 @@ from tactile_lab.slam.tracking.trackers import (
     GRAPH_METHODS,
     THESIS_METHODS,
     TrackingSettings,
+    checked_known_poses,
     make_tracker,
-    poses_to_be_told,
 )
 
 _STAYS = 1e-9
@@ -105,7 +105,7 @@ class TactileSlam:
             ConfigurationError: the method needs poses and has none, or is given poses that it must not use.
         """
         self._settings = settings or SlamSettings()
-        self._known_poses = poses_to_be_told(self._settings.method, known_poses)
+        self._known_poses = checked_known_poses(self._settings.method, known_poses)
         self._seed = seed
         self._rng = np.random.default_rng(seed)
         back_end = self._settings.back_end

@@ -171,7 +171,7 @@ def _record(
         for onlooker in attendance.onlookers:
             session.recorder.add_onlooker(onlooker)
         runtime = laboratory.runtime(session.recorder)
-        runtime.tell_problems_to(progress.on_message)
+        runtime.report_problems_to(progress.on_message)
         settings = settings_for(_conductor_settings(rig, request), attendance)
         seed, dimension = request.seed, request.dimension
         roles = roles_for(attendance, runtime, slam, settings, session.folder, seed=seed, dimension=dimension)

@@ -43,11 +43,6 @@ class MotionLimiter:
         """The next place while it comes to rest wherever that is, shape (6,)."""
         return self.step(self.place, duration_s)
 
-    @property
-    def at_rest(self) -> bool:
-        """Whether it stands still."""
-        return bool(np.abs(self.speed).max() < 1e-9)
-
 
 def _wanted_speed(way: Array, speed: float, acceleration: float, duration_s: float) -> Array:
     """Velocity towards the end of a way, from which braking in time is possible."""

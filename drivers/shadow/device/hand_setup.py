@@ -16,7 +16,7 @@ from drivers.shadow.ethercat.hand_transport import EthercatSettings, EthercatTra
 from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
 from drivers.shadow.model.gains import GainTable, load_gains
 from drivers.shadow.model.hand_form import HandForm
-from drivers.shadow.model.hand_info import HandInfo, HandStatement, check_map, load_infos, told_form, told_serial
+from drivers.shadow.model.hand_info import HandInfo, HandStatement, check_map, load_infos, stated_form, stated_serial
 from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_configuration import load_configurations
@@ -113,11 +113,11 @@ class HandSetup(StrictModel):
     def form(self) -> HandForm:
         """Which hand it is, by its files and the rig's. Raises ConfigurationError."""
         stated = HandStatement(f"{self.name} in the rig file", self.hand.side or self.ethercat.side, self.hand.fingers)
-        return told_form(self.motors, self.infos(), stated)
+        return stated_form(self.motors, self.infos(), stated)
 
     def wiring(self) -> EthercatSettings:
         """How the hand is reached, with the side and the serial number that it must have. Raises ConfigurationError."""
-        serial, stated = told_serial(self.infos()), self.ethercat.serial
+        serial, stated = stated_serial(self.infos()), self.ethercat.serial
         if None not in (serial, stated) and serial != stated:
             what = f"names hand {stated}, but its files are those of hand {serial}"
             hint = "Use the files of the connected hand; its serial number is the folder's name"

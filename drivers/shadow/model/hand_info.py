@@ -83,7 +83,7 @@ def _info_place(file: Path) -> Path | None:
     return next((place for folder in [*file.parents][:_LEVELS] if (place := folder / INFO_FILE).is_file()), None)
 
 
-def told_serial(infos: Iterable[Path]) -> int | None:
+def stated_serial(infos: Iterable[Path]) -> int | None:
     """The hand's serial number by the names of its folders, which are Shadow's; None if they contain none.
 
     Raises:
@@ -110,7 +110,7 @@ def check_map(motors: Path, infos: Mapping[Path, HandInfo]) -> None:
             raise ConfigurationError(what, where=str(place), hint=f"Set calibration.motors to {named}")
 
 
-def told_form(motors: Path, infos: Mapping[Path, HandInfo], stated: HandStatement) -> HandForm:
+def stated_form(motors: Path, infos: Mapping[Path, HandInfo], stated: HandStatement) -> HandForm:
     """The form of the hand by all these files; a right hand's if none states the side.
 
     Args:
@@ -123,7 +123,7 @@ def told_form(motors: Path, infos: Mapping[Path, HandInfo], stated: HandStatemen
     """
     motor_map = MotorMap.load(motors)
     told: dict[str, Side | None] = {str(place): info.side for place, info in infos.items()}
-    told |= {str(motors): motor_map.told_side, stated.where: stated.side}
+    told |= {str(motors): motor_map.stated_side, stated.where: stated.side}
     form = HandForm(_agreed_side({place: side for place, side in told.items() if side is not None}), motor_map.driven)
     for place, info in infos.items():
         if info.fingers is not None:

@@ -62,13 +62,13 @@ class MotorMap:
         numbers: motor number 0 to 19 of each driven joint that the hand has, of :data:`DRIVEN_JOINTS`.
         backwards: driven joints that a positive duty cycle turns towards smaller angles.
         where: the file, for error messages.
-        told_side: the side of the hand, if the file states it.
+        stated_side: the side of the hand, if the file states it.
 
     Attributes:
         names: driven joint of each motor, by motor number; empty for a place without a motor.
         numbers: motor number of each driven joint.
         driven: the driven joints that the hand has, in the order of :data:`DRIVEN_JOINTS`.
-        told_side: as given.
+        stated_side: as given.
         is_fitted: whether there is a motor, by motor number, shape (20,).
         sign: +1 or -1 by motor number, shape (20,).
         from_joints: matrix, shape (20, 24), that takes joint angles to those of the driven joints by motor number.
@@ -83,12 +83,12 @@ class MotorMap:
         numbers: Mapping[str, int],
         backwards: tuple[str, ...] = (),
         where: str = "motor map",
-        told_side: Side | None = None,
+        stated_side: Side | None = None,
     ) -> None:
         _check_one_to_one(numbers, backwards, where)
         self.numbers: Mapping[str, int] = dict(numbers)
         self.driven: tuple[str, ...] = tuple(name for name in DRIVEN_JOINTS if name in numbers)
-        self.told_side = told_side
+        self.stated_side = stated_side
         by_motor = {motor: name for name, motor in numbers.items()}
         self.names: tuple[str, ...] = tuple(by_motor.get(motor, "") for motor in range(MOTORS))
         self.is_fitted: NDArray[np.bool_] = np.array([bool(name) for name in self.names])
@@ -116,14 +116,14 @@ class MotorMap:
             listed = strict_yaml.validate(content, _ShadowMapFile, where=str(path)).joint_to_motor_mapping
             named = dict(zip(_SHADOW_JOINTS, listed, strict=True))
             numbers = {joint: motor for joint, motor in named.items() if motor >= 0}
-            return cls(numbers, where=str(path), told_side=_MAP_SIDES.get(path.name[:3]))
+            return cls(numbers, where=str(path), stated_side=_MAP_SIDES.get(path.name[:3]))
         own = strict_yaml.validate(content, _MotorFile, where=str(path))
         return cls(own.motors, own.reversed, str(path), own.side)
 
     def reverse(self, backwards: tuple[str, ...]) -> MotorMap:
         """The same map with other joints turning backwards, by the signs in a file of gains."""
         own = tuple(name for name in backwards if name in self.numbers)
-        return MotorMap(self.numbers, own, "motor map", self.told_side)
+        return MotorMap(self.numbers, own, "motor map", self.stated_side)
 
     def _matrix(self) -> Array:
         matrix = np.zeros((MOTORS, len(JOINTS)))

@@ -55,14 +55,14 @@ class SegmentMessages:
                         yield self._topics.get(record.channel_id), record
             self._loss.truncated |= not frames.complete
             self._loss.unreadable_bytes += frames.unreadable_bytes
-            self._tell_lost(summary)
+            self._count_lost(summary)
 
     def _note(self, message: Message) -> None:
         self._read[message.channel_id] += 1
         self._gaps += (message.sequence - self._expected) & 0xFFFFFFFF
         self._expected = message.sequence + 1
 
-    def _tell_lost(self, summary: Summary) -> None:
+    def _count_lost(self, summary: Summary) -> None:
         """What is lost of each topic: by the summary, else by the indices of chunks that could not be read."""
         lost = Counter(summary.counts) - self._read if summary.counts else self._indexed
         for channel, number in lost.items():

@@ -1,7 +1,7 @@
 """The default policy: the grasp with the most expected information about shape and pose together, per second.
 
 See :mod:`tactile_lab.slam.exploration.expected_information`. Where the estimate has alternatives, what a grasp tells
-about which of them is right counts too (:mod:`tactile_lab.slam.exploration.telling_apart`).
+about which of them is right counts too (:mod:`tactile_lab.slam.exploration.alternative_information`).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.exploration.alternative_information import told_apart
 from tactile_lab.slam.exploration.candidates import Candidate
 from tactile_lab.slam.exploration.expected_information import (
     InformationSettings,
@@ -20,7 +21,6 @@ from tactile_lab.slam.exploration.expected_information import (
     unexplored_vertices,
 )
 from tactile_lab.slam.exploration.policy import Belief, Decision, Surface, best_of, surface_to_foresee
-from tactile_lab.slam.exploration.telling_apart import told_apart
 
 _AHEAD = 3
 """Number of grasps by which a pose of the object is rated before it is carried there."""

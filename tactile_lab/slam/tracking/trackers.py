@@ -160,7 +160,7 @@ def make_tracker(
     return AddedTracker(settings.method, METHODS.file(settings.method), lambda: make(settings, start))
 
 
-def poses_to_be_told(method: str, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
+def checked_known_poses(method: str, poses: Sequence[Pose3 | None] | None) -> tuple[Pose3 | None, ...] | None:
     """Check that only the method that needs true poses gets them.
 
     Raises:

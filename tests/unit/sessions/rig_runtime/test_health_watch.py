@@ -38,7 +38,7 @@ def test_motors_are_told_apart_and_what_is_usual_at_rest_is_no_fault() -> None:
 def test_a_bench_tells_what_its_devices_and_fingertips_say() -> None:
     rig, heard = make_rig(Recorder(NullTraffic())), []
     rig.devices["base"].health = lambda: ("base: 3 cycles lost",)
-    rig.runtime.tell_problems_to(heard.append)
+    rig.runtime.report_problems_to(heard.append)
     rig.runtime.connect()
     rig.runtime.fingertips["MF"].fault = "reading beyond the calibration range"
     rig.runtime.run(200_000_000)

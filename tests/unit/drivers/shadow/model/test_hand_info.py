@@ -8,7 +8,7 @@ import pytest
 
 from drivers.core.errors import ConfigurationError
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
-from drivers.shadow.model.hand_info import HandStatement, check_map, load_infos, told_form, told_serial
+from drivers.shadow.model.hand_info import HandStatement, check_map, load_infos, stated_form, stated_serial
 from drivers.shadow.protocol.palm_images import Side
 from tests.support.hand_folders import FOLDERS, FULL_RIGHT, HandFolder, write_folder
 
@@ -17,7 +17,7 @@ RIG = "rig.yaml: hand"
 
 def form_of(folder: HandFolder, side: Side | None = None, fingers: tuple[str, ...] | None = None) -> HandForm:
     """What all files of a folder, and a rig file, tell together."""
-    return told_form(folder.motors, load_infos([folder.joints]), HandStatement(RIG, side, fingers))
+    return stated_form(folder.motors, load_infos([folder.joints]), HandStatement(RIG, side, fingers))
 
 
 def test_the_simulated_hand_is_a_right_one_unless_the_rig_says_otherwise(tmp_path: Path) -> None:
@@ -25,7 +25,7 @@ def test_the_simulated_hand_is_a_right_one_unless_the_rig_says_otherwise(tmp_pat
     folder.info.unlink()
     assert form_of(folder) == RIGHT_HAND
     folder.motors.rename(anonymous := tmp_path / "motors.yaml")
-    assert told_form(anonymous, {}, HandStatement(RIG, "left")).is_left
+    assert stated_form(anonymous, {}, HandStatement(RIG, "left")).is_left
 
 
 @pytest.mark.parametrize("kind", FOLDERS, ids=lambda kind: kind.name)
@@ -57,7 +57,7 @@ def test_a_left_hand_is_not_taken_for_a_right_one(tmp_path: Path) -> None:
         form_of(folder, "left")
     folder.motors.rename(left := folder.motors.with_name("lh_E_v3.yaml"))
     with pytest.raises(ConfigurationError, match=r"info.yaml: is of a right hand, but .*lh_E_v3.yaml of a left"):
-        told_form(left, load_infos([folder.joints]), HandStatement(RIG))
+        stated_form(left, load_infos([folder.joints]), HandStatement(RIG))
 
 
 def test_fingers_that_the_motor_map_does_not_drive_are_told(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_a_folder_with_a_typing_error_is_named(tmp_path: Path) -> None:
 
 def test_the_name_of_shadows_folder_is_the_serial_number(tmp_path: Path) -> None:
     places = [write_folder(tmp_path / name, FULL_RIGHT).info for name in ("378", "2106")]
-    assert told_serial(places[:1]) == 378
-    assert told_serial([tmp_path / "my-hand" / "general_info.yaml"]) is None
+    assert stated_serial(places[:1]) == 378
+    assert stated_serial([tmp_path / "my-hand" / "general_info.yaml"]) is None
     with pytest.raises(ConfigurationError, match=r"belongs to hand 378, but other files of the rig to hand 2106"):
-        told_serial(places)
+        stated_serial(places)

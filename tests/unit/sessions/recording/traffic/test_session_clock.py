@@ -68,7 +68,7 @@ def test_a_recording_blames_nobody_else_for_a_link_that_jumped(tmp_path: Path) -
 
 def test_a_bench_names_the_link_that_jumped_once_and_counts_what_its_hand_lost() -> None:
     rig, heard = make_rig(Recorder(NullTraffic()), unsteady=False), []
-    rig.runtime.tell_problems_to(heard.append)
+    rig.runtime.report_problems_to(heard.append)
     rig.runtime.connect()
     read = rig.peers["base"].read
     rig.peers["base"].read = lambda: [Datagram(one.payload, one.stamp_ns + JUMPED_ns) for one in read()]

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from gtsam import Pose2
 
+from tactile_lab.slam.exploration.alternative_information import told_apart
 from tactile_lab.slam.exploration.expected_information import InformationSettings
 from tactile_lab.slam.exploration.information_policy import InformationPolicy
 from tactile_lab.slam.exploration.policy import Belief, RivalObject, Surface
-from tactile_lab.slam.exploration.telling_apart import told_apart
 from tests.support.rectangle_world import belief_of, contacts_every, ten
 
 SIGMA_m, FINGER_m = 0.001, 0.002
