@@ -173,7 +173,7 @@ class Recorder:
         self._put_json(schemas.SLAM_STATE_TOPIC, content, stamp_ns)
 
     def surface(self, stamp_ns: int, content: Mapping[str, Any]) -> None:
-        """The estimated surface, see :func:`tactile_lab.autonomy.surface_message.surface_message`."""
+        """The estimated surface, see :func:`tactile_lab.autonomy.estimate_messages.surface_message`."""
         self._put_json(schemas.SLAM_SURFACE_TOPIC, {"timestamp": foxglove.time(stamp_ns), **content}, stamp_ns)
 
     def plan(self, stamp_ns: int, content: Mapping[str, Any]) -> None:

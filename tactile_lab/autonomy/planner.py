@@ -8,7 +8,7 @@ import numpy as np
 from gtsam import Pose2, Pose3
 
 from drivers.core.contacts import Array, Grasp
-from drivers.core.poses import planar, spatial, transform_points
+from drivers.core.poses import planar
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.estimator import Reorientation
@@ -16,17 +16,14 @@ from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
+from tactile_lab.autonomy.estimated_object import EstimatedObject
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
-from tactile_lab.autonomy.rival_objects import rival_objects
 from tactile_lab.autonomy.standing.candidate import SideReach
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
-from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp, known_shape
+from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp
 from tactile_lab.slam.doubt.assessment import Assessment
-from tactile_lab.slam.exploration.policy import RivalObject
-from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 from tactile_lab.slam.tactile_slam import TactileSlam
 
 _LANDING_m = 0.020
@@ -38,12 +35,11 @@ _UPWARD = 0.7
 _LEAST_BY_POLICY = 2
 """With fewer contacts than this the object is not where it was expected."""
 
-
 _BLOCKED_FROM_ABOVE = 2
 """Approaches in a row; then, in space, the hand touches, or comes from the side."""
 
 HIGHEST_FROM_ABOVE_m = 0.08
-"""What is taller is grasped from the side: the knuckles would come down on it."""
+"""Taller objects are grasped from the side: the knuckles would land on them."""
 
 
 class Planner:
@@ -77,10 +73,7 @@ class Planner:
     ) -> None:
         self._slam, self._rule, self._exploration = slam, rule, exploration
         self._fixed_grasps, self._hand, self._dimension = fixed_grasps, hand, dimension
-        self._known: tuple[Gpis, KnownShape] | None = None
-        self._assessed: tuple[KnownShape | None, Assessment] | None = None
-        self._compared: tuple[tuple[Assessment, Pose3], tuple[RivalObject, ...]] | None = None
-        self._hand_motion = Pose3()
+        self._object = EstimatedObject(slam, exploration, dimension)
         self._landings_m: list[Array] = []
         self._by_estimate = False
         self._doubted = False
@@ -90,14 +83,14 @@ class Planner:
         self._box: BoundingBox | None = None
         self._reach, self._touches = reach or SideReach(), touches
         self._standing: StandingPlanner | None = None
-        """Plans where the palm does not pass over the object: that is left where it stands."""
+        """Plans if the palm cannot pass over the object, which then stays in place."""
 
         self._for_once = False
-        """Whether it plans only one grasp or touch of an object that is else grasped from above."""
+        """Whether it plans only one grasp or touch of an object that is otherwise grasped from above."""
 
         self._blocked, self._standstill = 0, Standstill()
         self.exhausted = ""
-        """Why nothing is left to do, in words; empty while there is something."""
+        """Why no action is left, in words; empty while there is one."""
         self.choice: Choice | None = None
         """The policy's decision about the next grasp; None if the policy was not asked."""
 
@@ -132,9 +125,9 @@ class Planner:
         return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
 
     def _beside(self, index: int) -> GraspPlan | None:
-        """A plan for what is too tall for the palm to pass over, or for what blocked the way down; None for the rest.
+        """A plan for an object that is too tall to pass over, or that blocked the descent; None for others.
 
-        What blocked the way down is tried from above again after one capture beside it, or where there is none.
+        After a blocked descent one touch is captured, if one is possible; then grasps come from above again.
         """
         if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
             self._standing, self._for_once = self._standing_planner(), True
@@ -159,13 +152,8 @@ class Planner:
         )
 
     def _felt_object(self) -> FeltObject:
-        field, pose, top_m = self._slam.surface, self._expected_pose(), self._rule.top_m or HIGHEST_FROM_ABOVE_m
-        if field is None or pose is None or field.contacts_m.shape[1] == 2:
-            return FeltObject.around(self.centre_m, top_m, np.empty((0, 3)), np.empty((0, 3)))
-        world_T_object = spatial(pose, self._slam.origin_height_m)
-        points_m = transform_points(world_T_object, field.contacts_m)
-        normals = field.normals @ world_T_object.rotation().matrix().T
-        return FeltObject.around(self.centre_m, top_m, points_m, normals)
+        top_m = self._rule.top_m or HIGHEST_FROM_ABOVE_m
+        return FeltObject.around(self.centre_m, top_m, *self._object.contacts_world())
 
     def replan(self, index: int) -> GraspPlan:
         """Another plan for the same grasp, after a person has vetoed the last one."""
@@ -197,19 +185,16 @@ class Planner:
         return replace(rule, tap=self._rule.taps(index), reason=f"{rule.reason}, as {choice.decision.reason}")
 
     def _knowledge(self, index: int) -> Knowledge | None:
-        known, expected, covariance = self.known_shape(), self._expected_pose(), self._slam.pose_covariance
+        known, expected, covariance = (
+            self._object.known_shape(),
+            self._object.expected_pose(),
+            self._slam.pose_covariance,
+        )
         if known is None or expected is None or covariance is None or self._chooser is None:
             return None
         left = None if self._grasps is None else self._grasps - index
         spread = self._chooser.spread(covariance, self._carried)
-        return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here, self._rivals())
-
-    def _rivals(self) -> tuple[RivalObject, ...]:
-        key = self.assessment(), self._hand_motion
-        if self._compared is None or any(one is not other for one, other in zip(self._compared[0], key, strict=True)):
-            found = rival_objects(self._slam, key[0].alternatives, self._hand_motion, self._exploration)
-            self._compared = key, found
-        return self._compared[1]
+        return Knowledge(known, expected, spread, self._slam.surface_grasps, left, self._here, self._object.rivals())
 
     def on_bounding_box(self, box: BoundingBox) -> None:
         """Note the bounding box: the object is in its middle, and open fingers keep out of it.
@@ -234,7 +219,7 @@ class Planner:
             self._standing.on_blocked()
 
     def _best_by_estimate(self, index: int) -> GraspPlan | None:
-        known, expected = self.known_shape(), self._expected_pose()
+        known, expected = self._object.known_shape(), self._object.expected_pose()
         if known is None or expected is None:
             return None
         height_m, settings = self._rule.height_m(index), self._rule.settings
@@ -245,11 +230,6 @@ class Planner:
         return choose_grasp(
             known, expected, settings.closings, table, settings.yaw_window_rad, self._exploration, self._has_room
         )
-
-    def _expected_pose(self) -> Pose2 | None:
-        """Pose of the object after it was carried; None if unknown."""
-        pose = self._slam.world_T_object
-        return None if pose is None or self._slam.is_lost else planar(self._hand_motion * pose)
 
     def _has_room(self, plan: GraspPlan) -> bool:
         if not self._landings_m and self._box is None:
@@ -272,7 +252,7 @@ class Planner:
         if self._standing is not None or plan.only_touch:
             if self._for_once:
                 self._return_above()
-            self._hand_motion, self._here = Pose3(), plan.frame
+            self._object.hand_motion, self._here = Pose3(), plan.frame
             return Reorientation(0.0, np.zeros(2))
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
         self._doubted = self._by_estimate and len(grasp.touching) < least
@@ -281,7 +261,7 @@ class Planner:
         if tops_m := [float(c.point_world_m[2]) for c in grasp.contacts if c.probed and c.normal_world[2] > _UPWARD]:
             self._rule.top_m = max(tops_m)
         turn_rad = self._turn(grasp, plan)
-        self._hand_motion, self._here = Pose3(), plan.frame
+        self._object.hand_motion, self._here = Pose3(), plan.frame
         shift_m = np.zeros(2) if turn_rad is None else self._rule.step_back(self.centre_m)
         return Reorientation(turn_rad or 0.0, shift_m)
 
@@ -300,7 +280,7 @@ class Planner:
 
     def on_carry(self, hand_motion_world: Pose3) -> None:
         """Note that the hand carried the object since the last grasp."""
-        self._hand_motion, motion = hand_motion_world, planar(hand_motion_world)
+        self._object.hand_motion, motion = hand_motion_world, planar(hand_motion_world)
         self._box = None if self._box is None else self._box.move(motion)
         self._carried = not hand_motion_world.equals(Pose3(), 1e-9)
         if self._carried:
@@ -312,7 +292,7 @@ class Planner:
 
     def on_undo(self, hand_motion_world: Pose3) -> None:
         """Note that the last grasp was undone; the motion is the hand odometry since the one before."""
-        self._hand_motion, self._doubted = hand_motion_world, False
+        self._object.hand_motion, self._doubted = hand_motion_world, False
 
     def on_estimate(self, index: int, is_placed: bool) -> None:
         """Note that grasp number ``index`` has been estimated.
@@ -326,7 +306,7 @@ class Planner:
             self._chooser.on_unplaced_grasp()
         if self._standing is not None:
             self._standing.on_estimate(is_placed)
-        known, expected = self.known_shape(), self._expected_pose()
+        known, expected = self._object.known_shape(), self._object.expected_pose()
         if known is not None:
             self._standstill.note(known.explored)
         trusted = index + 1 >= self._fixed_grasps and not self._doubted and self._standing is None
@@ -335,25 +315,9 @@ class Planner:
             self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))
 
     def known_shape(self) -> KnownShape | None:
-        """The present estimate of the shape; None before there is one.
-
-        In space its surface is that of the most probable model, as in the result of a session.
-        """
-        field = self._slam.surface
-        if field is None:
-            return None
-        if self._known is None or self._known[0] is not field:
-            self._known = (field, self._measure_shape(field))
-        return self._known[1]
+        """The present estimate of the shape; None before there is one."""
+        return self._object.known_shape()
 
     def assessment(self) -> Assessment:
-        """What may be believed of the present estimate."""
-        known = self.known_shape()
-        if self._assessed is None or known is None or self._assessed[0] is not known:
-            self._assessed = known, self._slam.assess(None if known is None else known.extracted)
-        return self._assessed[1]
-
-    def _measure_shape(self, field: Gpis) -> KnownShape:
-        shape = self._slam.shape(self._exploration.mesh_resolution_m) if self._dimension == 3 else None
-        mesh = shape if isinstance(shape, SurfaceMesh) else None
-        return known_shape(field, self._dimension, self._slam.origin_height_m, self._exploration, mesh)
+        """How far to trust the present estimate."""
+        return self._object.assessment()

@@ -19,10 +19,9 @@ from drivers.core.poses import planar
 from sessions.conductor.estimator import Estimate, PlannedGrasp, Reorientation
 from sessions.motion.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
+from tactile_lab.autonomy.estimate_messages import surface_message, trust_message
 from tactile_lab.autonomy.freed_memory import return_freed_memory
 from tactile_lab.autonomy.planner import Planner
-from tactile_lab.autonomy.surface_message import surface_message
-from tactile_lab.autonomy.trust_message import trust_message
 from tactile_lab.autonomy.unknown_part import describe_unknown
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.tactile_slam import TactileSlam

@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 from drivers.core.contacts import FINGERS, Contact, Grasp
 from drivers.core.poses import planar
 from drivers.shadow.closing.posture import HandShape
+from tactile_lab.autonomy.estimate_messages import surface_message
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
-from tactile_lab.autonomy.surface_message import surface_message
 from tactile_lab.autonomy.unknown_part import describe_unknown
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, known_shape
 from tactile_lab.slam.exploration.rewards import explored_share

@@ -1,4 +1,4 @@
-"""The estimated surface as a message for viewers."""
+"""The estimate as plain data, for recording and viewers: its surface, and how far to trust it."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from tactile_lab.autonomy.variance_planner import KnownShape
+from tactile_lab.slam.doubt.assessment import Assessment
 
 
 def surface_message(known: KnownShape | None) -> dict[str, Any]:
@@ -25,6 +26,16 @@ def surface_message(known: KnownShape | None) -> dict[str, Any]:
     if known.dimension == 2:
         vertices_m, faces = np.pad(vertices_m, ((0, 0), (0, 1))), np.zeros((0, 3), dtype=int)
     return _message(known.dimension, vertices_m, faces, known.surface.sigma_m, known.explored, known.origin_height_m)
+
+
+def trust_message(found: Assessment) -> dict[str, Any]:
+    """The status, the share of the shape that was touched, and doubts and alternatives as sentences."""
+    return {
+        "status": found.status,
+        "known_share": found.known_share,
+        "doubts": [doubt.words for doubt in found.doubts],
+        "alternatives": [one.words() for one in found.alternatives],
+    }
 
 
 def _message(
