@@ -12,6 +12,7 @@ from drivers.core.calibration_file import load_parameters
 from drivers.core.configuration import StrictModel, validate
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import open_plain
 
 _DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 _UNDISTORTION = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-9)
@@ -101,7 +102,7 @@ def load_camera(path: Path) -> CameraCalibration:
 def is_opencv(path: Path) -> bool:
     """Whether a file has OpenCV's header; such a file does not name its camera. Raises ConfigurationError."""
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             return file.read(9) == b"%YAML:1.0"
     except OSError as error:
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error

@@ -19,6 +19,7 @@ from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import PICTURES, CameraSourceSettings
 from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.errors import ConfigurationError, DeviceError
+from drivers.core.reading.bounded_files import LARGEST_PICTURE_bytes, check_size
 
 _MANUAL_EXPOSURE_V4L2 = 1.0
 _EXPOSURE_UNITS_PER_ms = 10.0  # V4L2 counts in 100 microseconds
@@ -162,7 +163,8 @@ class FolderSource:
         self._next += 1
         self._counter += 1
         image = None
-        with suppress(cv2.error):  # more pixels than the library is allowed to make
+        with suppress(cv2.error, OSError):  # more pixels than the library is allowed to make
+            check_size(file, LARGEST_PICTURE_bytes)
             image = cv2.imread(str(file), cv2.IMREAD_GRAYSCALE)
         if image is None:
             raise ConfigurationError("is not a readable picture", where=str(file), hint="Remove it from the folder")

@@ -5,6 +5,7 @@ What cannot be repaired is refused, with the measured numbers and what to change
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,8 @@ import numpy as np
 import trimesh
 
 from drivers.core.errors import ConfigurationError
-from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size, refuse_unreachable
+from drivers.core.reading.bounded_files import refuse_unreachable
+from drivers.core.reading.foreign_mesh import load_foreign_mesh
 from drivers.simulation.mesh_parts import nearest_gap_m, outer_surface, without_inner_parts
 
 LARGEST_m, SMALLEST_m = 0.25, 0.01
@@ -57,9 +59,11 @@ def _read(path: Path) -> trimesh.Trimesh:
     refuse_unreachable(path)
     if not path.is_file():
         raise ConfigurationError("file not found", where=str(path), hint="Check the path of the mesh")
-    check_size(path, LARGEST_MESH_bytes)
     try:
-        mesh = trimesh.load(path, force="mesh")
+        with warnings.catch_warnings(action="ignore"):  # numbers that are too large are told below
+            mesh = load_foreign_mesh(path, force="mesh")
+    except ConfigurationError:
+        raise
     except Exception as error:  # the readers of a dozen formats raise all kinds of exceptions
         raise ConfigurationError(
             f"cannot be read as a mesh ({error})", where=str(path), hint="Give a PLY, STL, OBJ or GLB file"

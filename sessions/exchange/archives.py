@@ -18,6 +18,7 @@ from typing import BinaryIO
 
 from drivers.core.atomic_files import writing_into
 from drivers.core.errors import ConfigurationError, SessionDataError, WriteError, given_by_a_person
+from drivers.core.reading.bounded_files import open_plain
 from sessions.recording.manifest import MANIFEST, read_manifest, write_manifest
 from sessions.recording.session import TRAFFIC, Session
 from sessions.recording.session_ids import LONGEST_ID, check_id, slug
@@ -81,7 +82,7 @@ def import_archive(path: Path, root: Path, name: str | None = None, limits: Arch
     """
     limits = limits or ArchiveLimits()
     try:
-        with zipfile.ZipFile(path) as archive:
+        with open_plain(path) as file, zipfile.ZipFile(file) as archive:
             entries = _checked_entries(archive, path, limits)
             top = _folder_of_session(entries, path)
             folder = root / check_id(name or slug(top.name or path.stem)[:LONGEST_ID], str(path))

@@ -128,13 +128,13 @@ def _read_through(reader: TrafficReader) -> bool:
 
 
 def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
-    """Copy everything but recording, manifest and results; calibrations come from the recording."""
+    """Copy everything but recording, manifest, results, links, pipes and devices; calibrations come from the recording."""
     for item in sorted(source.iterdir()):
-        if item.is_symlink() or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
+        if _is_special(item) or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
             continue
         if item.is_dir():
             copied = folder / item.name
-            shutil.copytree(item, copied, symlinks=True, ignore=_results_among, copy_function=_copy_file)
+            shutil.copytree(item, copied, symlinks=True, ignore=_left_out, copy_function=_copy_file)
         else:
             shutil.copyfile(item, folder / item.name)
     (folder / CALIBRATION).mkdir(exist_ok=True)
@@ -154,8 +154,13 @@ def _holds_results(item: Path) -> bool:
     return item.name == RESULTS or (item / TRAJECTORY).is_file()
 
 
-def _results_among(folder: str, names: list[str]) -> list[str]:
-    return [name for name in names if _holds_results(Path(folder) / name)]
+def _left_out(folder: str, names: list[str]) -> list[str]:
+    items = [Path(folder) / name for name in names]
+    return [item.name for item in items if _holds_results(item) or (_is_special(item) and not item.is_symlink())]
+
+
+def _is_special(item: Path) -> bool:
+    return item.is_symlink() or not (item.is_file() or item.is_dir())
 
 
 def _result_folders(source: Path) -> tuple[str, ...]:

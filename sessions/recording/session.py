@@ -17,6 +17,7 @@ from pathlib import Path
 
 from drivers.core.atomic_files import disk_full
 from drivers.core.errors import ConfigurationError, SessionDataError, SessionError, WriteError
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
 from sessions.recording.manifest import (
     MANIFEST,
     Manifest,
@@ -128,9 +129,11 @@ def new_folder(root: Path, name: str) -> Path:
 def read_calibration(path: Path, hint: str = "") -> bytes:
     """The bytes of a calibration file. Raises SessionError."""
     try:
-        return path.read_bytes()
+        return read_bounded(path, LARGEST_TABLE_bytes)
     except OSError as error:
         raise SessionDataError(f"cannot be read ({error.strerror})", where=str(path), hint=hint) from error
+    except ConfigurationError as error:
+        raise SessionDataError(error.what, where=str(path), hint=hint) from error
 
 
 def sha256(content: bytes) -> str:

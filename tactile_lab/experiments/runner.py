@@ -17,6 +17,8 @@ from typing import IO
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.errors import ConfigurationError
+from drivers.core.reading.bounded_files import MB, read_bounded
+from drivers.core.reading.json_text import parse_json
 from tactile_lab.experiments.cells import Cell, Row, Work, execute
 from tactile_lab.experiments.execution.cluster import run_on_cluster
 from tactile_lab.experiments.execution.process_pool import run_in_processes
@@ -24,6 +26,8 @@ from tactile_lab.experiments.execution.source_version import version
 
 FORMAT = "tactile-experiment/1"
 LINES_FILE = "runs.jsonl"
+_LARGEST_bytes = 200 * MB
+"""A hundred thousand runs."""
 SEVERAL = "several versions"
 """Version in a file with results of several versions, so that no version takes them for its own."""
 
@@ -118,13 +122,13 @@ def _known_rows(name: str, file: Path, keep: bool) -> tuple[dict[str, Row], str]
     if not file.is_file():
         return {}, version()
     try:
-        head, *lines = file.read_text(encoding="utf-8").splitlines()
-        found = json.loads(head)
+        head, *lines = read_bounded(file, _LARGEST_bytes).decode("utf-8").splitlines()
+        found = parse_json(head.encode())
         if found["format"] != FORMAT or found["experiment"] != name:
             raise ConfigurationError(
                 f"contains results of {found['experiment']}", where=str(file), hint="Choose another --out"
             )
-        rows = [Row.from_json(json.loads(line)) for line in _whole(lines)]
+        rows = [Row.from_json(parse_json(line.encode())) for line in _whole(lines)]
     except (OSError, ValueError, KeyError, TypeError) as error:
         hint = "Remove the file to start again, or choose another --out"
         raise ConfigurationError("is not a results file", where=str(file), hint=hint) from error

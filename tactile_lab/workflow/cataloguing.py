@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
@@ -17,7 +16,8 @@ from sessions.exchange.addresses import address_of, write_anywhere
 from sessions.exchange.elsewhere import list_elsewhere
 from sessions.recording.listing import SessionSummary, list_sessions
 from sessions.recording.manifest import Manifest
-from sessions.recording.session import Session
+from sessions.recording.session import RESULTS, Session
+from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.workflow.plugging import RECORD
 
 UNITS: Mapping[str, str] = {
@@ -203,7 +203,7 @@ def _duration_s(manifest: Manifest) -> float | None:
 def _figures(session: Session) -> Iterator[tuple[str, Any]]:
     """What the evaluation of the session's own results says; nothing without one."""
     try:
-        content = json.loads((session.results / "evaluation.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json_object(session.folder / RESULTS / "evaluation.json", hint="")
+    except SessionError:
         return
     yield from ((name, _inside(content, *keys)) for name, keys in _FIGURES.items())

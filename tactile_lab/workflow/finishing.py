@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
+import hashlib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from sessions.recording.traffic.loss import Loss
 from tactile_lab import report
 from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate
+from tactile_lab.evaluation.files.plain import read_json_object
 from tactile_lab.evaluation.files.properties_file import PROPERTIES, write_properties
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.files.results import read_results
@@ -132,12 +134,12 @@ def differing_files(one: Path, other: Path) -> list[str]:
 def _replayed_content(file: Path) -> object:
     if not file.is_file():
         return None
-    if file.name != "slam.json":
-        return file.read_bytes()
-    try:
-        return {key: value for key, value in json.loads(file.read_bytes()).items() if key != "settings"}
-    except (ValueError, AttributeError):  # damaged: compared as it is
-        return file.read_bytes()
+    if file.name == "slam.json":
+        with suppress(SessionError):  # damaged: compared as it is
+            content = read_json_object(file, hint="")
+            return {key: value for key, value in content.items() if key != "settings"}
+    with file.open("rb") as opened:
+        return hashlib.file_digest(opened, "sha256").digest()
 
 
 def estimate_rest(slam: TactileSlam, grasps: Sequence[Grasp], progress: Progress | None = None) -> None:

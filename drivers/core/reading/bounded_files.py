@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 from pathlib import Path
+from typing import BinaryIO
 
 from drivers.core.errors import ConfigurationError
 
@@ -17,6 +19,8 @@ LARGEST_JSON_bytes = 16 * MB
 """A contact log of 8000 grasps; a document of nothing but brackets takes twenty times as much in memory."""
 LARGEST_MESH_bytes = 64 * MB
 """A binary mesh of more than a million triangles."""
+LARGEST_PICTURE_bytes = 64 * MB
+"""20 million pixels, not packed."""
 _SHOWN = 200
 
 
@@ -31,12 +35,26 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
         OSError: it is missing, or cannot be read.
         ConfigurationError: it is larger, or a pipe or device, which might never end.
     """
-    with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as file:  # a pipe is not waited for
+    with _opened(path) as file:
         check_plain(path, os.fstat(file.fileno()), most_bytes)
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:  # it has grown
         raise _too_large(path, len(content), most_bytes)
     return content
+
+
+def open_plain(path: Path) -> BinaryIO:
+    """A plain file of any size, for who reads it piece by piece. Raises OSError, for a pipe or device too."""
+    file = _opened(path)
+    if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+        file.close()
+        raise OSError(errno.EINVAL, "a pipe or device", str(path))
+    return file
+
+
+def _opened(path: Path) -> BinaryIO:
+    """A pipe is not waited for."""
+    return os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb")
 
 
 def refuse_unreachable(path: Path) -> None:

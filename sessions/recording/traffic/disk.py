@@ -72,7 +72,7 @@ class CutBackFile:
 def being_written(path: Path) -> bool:
     """Whether a running program has a file open for recording."""
     try:
-        descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe is not waited for
     except OSError:
         return False
     try:

@@ -17,6 +17,8 @@ from typing import BinaryIO
 from mcap.opcode import Opcode
 from mcap.writer import MCAP0_MAGIC
 
+from drivers.core.reading.bounded_files import open_plain
+
 _FRAME = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQII")  # begins, ends, bytes unpacked, checksum, length of what follows: the packing
 _CHUNK_BYTES = _CHUNK_HEAD.size + len(b"zstd") + 8  # of a chunk besides its records
@@ -34,8 +36,8 @@ DAMAGE = 0
 
 
 def ends_well(path: Path) -> bool:
-    """Whether a file ends like a finished MCAP file; nothing else is checked."""
-    with path.open("rb") as file:
+    """Whether a file ends like a finished MCAP file; nothing else is checked. Raises OSError."""
+    with open_plain(path) as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - len(MCAP0_MAGIC)))
         return file.read() == MCAP0_MAGIC

@@ -23,6 +23,7 @@ from mcap.reader import make_reader
 from mcap.records import Attachment, Header, Message, Metadata
 
 from drivers.core.errors import SessionDataError
+from drivers.core.reading.bounded_files import open_plain
 from sessions.recording.traffic import formats, raw_frames, schemas
 from sessions.recording.traffic.files import PROFILE, SEAL, is_sealed, segment_path
 from sessions.recording.traffic.loss import Loss
@@ -185,7 +186,7 @@ def may_hold(path: Path, topics: Collection[str]) -> bool:
 
 def _names_one(path: Path, topics: Collection[str]) -> bool:
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             summary = make_reader(file).get_summary()
     except (OSError, McapError, ValueError):
         return True  # whoever reads it will find out

@@ -16,6 +16,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, Message, MessageIndex, Metadata
 
 from drivers.core.errors import SessionDataError
+from drivers.core.reading.bounded_files import open_plain
 from sessions.recording.traffic.files import END_RECORD
 from sessions.recording.traffic.loss import Loss
 from sessions.recording.traffic.mcap_chunks import split_chunk
@@ -106,7 +107,7 @@ class SegmentMessages:
 def open_segment(path: Path) -> BinaryIO:
     """Open a file of a recording. Raises SessionDataError."""
     try:
-        return path.open("rb")
+        return open_plain(path)
     except OSError as error:
         raise SessionDataError(
             f"cannot be opened ({error.strerror})", where=str(path), hint="Check the session folder"

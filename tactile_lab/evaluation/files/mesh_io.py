@@ -12,8 +12,8 @@ from scipy.spatial import cKDTree
 
 from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array
-from drivers.core.errors import ShapeError
-from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, check_size
+from drivers.core.errors import ConfigurationError, ShapeError
+from drivers.core.reading.foreign_mesh import load_foreign_mesh
 from tactile_lab.colours import UNKNOWN
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
@@ -148,8 +148,10 @@ def _load(path: Path) -> trimesh.Trimesh:
     if not path.is_file():
         raise ShapeError("file not found", where=str(path), hint="Check the path")
     try:
-        check_size(path, LARGEST_MESH_bytes)
-        return trimesh.load_mesh(path, process=False)
+        mesh: trimesh.Trimesh = load_foreign_mesh(path, force="mesh", process=False)
+        return mesh
+    except ConfigurationError as error:
+        raise ShapeError(error.what, where=str(path), hint=error.hint) from error
     except Exception as error:  # each format's reader fails in its own way on foreign bytes
         raise ShapeError(
             f"cannot be read as a mesh ({type(error).__name__}: {error})",

@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from drivers.core.atomic_files import write_whole
-from drivers.core.errors import SessionError
+from drivers.core.errors import ConfigurationError, SessionDataError
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
+from drivers.core.reading.json_text import parse_json
 from tactile_lab.experiments.plot_data import Plot
 from tactile_lab.experiments.results.page_ages import ASK
 
@@ -147,16 +149,16 @@ class StoredResult:
         """Read a file.
 
         Raises:
-            SessionError: it cannot be read, or is not a stored result.
+            SessionDataError: it cannot be read, or is not a stored result.
         """
         try:
-            found = json.loads(file.read_text(encoding="utf-8"))
+            found = parse_json(read_bounded(file, LARGEST_JSON_bytes))
             if found["format"] != FORMAT:
                 raise ValueError(f"format {found['format']!r}")
             return cls(found["name"], found["sentence"], tuple(map(Part.from_json, found["parts"])))
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (OSError, ValueError, KeyError, TypeError, ConfigurationError) as error:
             hint = "Restore it from the repository, or store the result again"
-            raise SessionError(f"is not a stored result ({error!r})", where=str(file), hint=hint) from error
+            raise SessionDataError(f"is not a stored result ({error!r})", where=str(file), hint=hint) from error
 
     def write(self, folder: Path) -> Path:
         """Write the file ``NAME.json`` into a folder and return its path. Raises WriteError."""
