@@ -128,7 +128,7 @@ def _read_through(reader: TrafficReader) -> bool:
 
 
 def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
-    """Copy everything but recording, manifest, results, links, pipes and devices; calibrations come from the recording."""
+    """Copy all files but recording, manifest, results, links, pipes and devices; calibrations are the recording's."""
     for item in sorted(source.iterdir()):
         if _is_special(item) or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
             continue
