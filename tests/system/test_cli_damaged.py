@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 
 import pytest
@@ -175,3 +176,40 @@ def test_a_session_never_closed_is_shown_and_replayed(inside, session_copy):
     manifest.write_text(manifest.read_text().replace("status: closed", "status: open"))
     assert "killed before it was closed" in inside("session", "show", session_copy).out
     assert inside("session", "replay", session_copy, "--method", "odometry").code == 0
+
+
+@pytest.mark.parametrize(
+    ("file", "words"),
+    [
+        ("traffic.mcap", ("session", "replay")),
+        ("traffic.mcap", ("session", "recover")),
+        ("traffic.mcap", ("evaluate",)),
+        ("traffic-2.mcap", ("evaluate",)),
+        ("calibration/joints.yaml", ("session", "replay")),
+    ],
+)
+def test_a_pipe_in_a_session_is_not_waited_for(inside, session_copy, file, words):
+    (session_copy / file).unlink(missing_ok=True)
+    os.mkfifo(session_copy / file)
+    answer = inside(*words, session_copy)
+    assert answer.code == 2
+    assert f"{file}: " in answer.err
+    assert "a pipe or device" in answer.err
+
+
+def test_a_pipe_beside_a_recording_is_left_out_of_its_recovery(inside, session_copy):
+    os.mkfifo(session_copy / "calibration" / "pipe")
+    (session_copy / "calibration" / "joints.yaml").unlink()
+    os.mkfifo(session_copy / "calibration" / "joints.yaml")
+    assert inside("session", "recover", session_copy).code == 0
+    recovered = session_copy.with_name("session-recovered")
+    assert (recovered / "calibration" / "joints.yaml").is_file()
+    assert not (recovered / "calibration" / "pipe").exists()
+
+
+def test_results_that_are_nested_too_deeply_hide_no_others(inside, session_copy, tmp_path):
+    for name in ("evaluation.json", "slam.json"):
+        (session_copy / "results" / name).write_text(100_000 * "[")
+    assert inside("session", "catalogue", tmp_path, "--out", tmp_path / "all.csv").code == 0
+    assert len((tmp_path / "all.csv").read_text().splitlines()) == 2
+    assert "slam.json" in inside("session", "replay", session_copy).err

@@ -18,6 +18,11 @@ CHOSEN = [
     ("sensor calibration", "entities of entities"),
     ("mesh", "330 000 triangles"),
     ("mesh", "an accessor of a billion zeros"),
+    ("mesh", "a buffer that is a pipe"),
+    ("mesh", "a buffer that is another file"),
+    ("mesh", "materials that are a pipe"),
+    ("mesh", "two million lines"),
+    ("pictures", "a picture that is a pipe"),
 ]
 
 

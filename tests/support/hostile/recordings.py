@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 import struct
@@ -21,6 +22,8 @@ _SHOW = Kind("session description", ("session", "show", FILE), "")
 _EVALUATE = Kind("results", ("evaluate", FILE), "")
 _REPORT = Kind("results, reported", ("report", FILE), "")
 _IMPORT = Kind("archive", ("session", "import", FILE, "--root", "imported"), ".zip")
+_CATALOGUE = Kind("catalogue", ("session", "catalogue", FILE, "--out", "catalogue.csv"), "")
+_EXPERIMENT = Kind("results of an experiment", ("experiment", "methods-2d", "--grasps", "1", "--out", FILE), "")
 _NOISE = random.Random(2).randbytes(20 * MB)
 
 Content = bytes | Callable[[Path], None]
@@ -33,6 +36,18 @@ def recording_cases(session: Path) -> Iterator[Case]:
     yield from _REPLAY.cases({name: _spoil(session, "traffic.mcap", content) for name, content in streams.items()})
     chosen = ("a chunk of 1 GB, packed", "noise", "a million small records")
     yield from _RECOVER.cases({name: _spoil(session, "traffic.mcap", streams[name]) for name in chosen})
+    for kind in (_REPLAY, _RECOVER):
+        yield from kind.cases({"a pipe": _spoil(session, "traffic.mcap", os.mkfifo)})
+    yield from _REPLAY.cases(
+        {
+            "a calibration that is a pipe": _spoil(session, "calibration/joints.yaml", os.mkfifo),
+            "a second file that is a pipe": _spoil(session, "traffic-2.mcap", os.mkfifo),
+            "results of 50 kB of brackets": _spoil(session, "results/slam.json", b"[" * 50_000),
+        }
+    )
+    deep = _spoil(session, "results/evaluation.json", b"[" * 50_000)
+    yield from _CATALOGUE.cases({"an evaluation of 50 kB of brackets": lambda path: deep(path / "session")})
+    yield from _EXPERIMENT.cases({name: _results_file(content) for name, content in _experiments().items()})
     yield from _SHOW.cases({name: _spoil(session, "session.yaml", text) for name, text in _descriptions().items()})
     for kind, file, contents in (
         (_EVALUATE, "results/trajectory.csv", _trajectories()),
@@ -43,10 +58,35 @@ def recording_cases(session: Path) -> Iterator[Case]:
     yield from _IMPORT.cases(_archives())
 
 
-def _spoil(session: Path, file: str, content: bytes) -> Callable[[Path], None]:
+def _spoil(session: Path, file: str, content: Content) -> Callable[[Path], None]:
+    """A copy of a session with another file, or with one that is made at its place."""
+
     def make(path: Path) -> None:
         shutil.copytree(session, path)
-        (path / file).write_bytes(content)
+        (path / file).unlink(missing_ok=True)
+        if isinstance(content, bytes):
+            (path / file).write_bytes(content)
+        else:
+            content(path / file)
+
+    return make
+
+
+def _experiments() -> dict[str, bytes]:
+    """Files of results of an experiment that is to be resumed."""
+    head = b'{"format": "tactile-experiment/1", "experiment": "methods-2d", "version": '
+    return {
+        "50 kB of brackets": head + b"[" * 50_000,
+        "noise": _NOISE[:MB],
+        "201 MB": b" " * (201 * MB),
+        "a million runs that are none": head + b'"x"}\n' + b"{}\n" * MB,
+    }
+
+
+def _results_file(content: bytes) -> Callable[[Path], None]:
+    def make(path: Path) -> None:
+        path.mkdir()
+        (path / "runs.jsonl").write_bytes(content)
 
     return make
 

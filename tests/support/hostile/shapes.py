@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import struct
+import tarfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator
@@ -50,6 +52,7 @@ def _meshes() -> dict[str, dict[str, Content]]:
             "a million faces on three corners": "v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * MB,
             "one face of a million corners": "v 0 0 0\n" * 1000 + "f" + " 1 2 3 4 5" * 200_000,
             "materials that are devices": "mtllib /dev/zero\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+            "materials that are a pipe": lambda path: _with_pipe(path, "mtllib pipe\n" + _TRIANGLE),
             "all corners at one place": "v 0.1 0.1 0.1\n" * 10_000
             + "".join(f"f {n} {n + 1} {n + 2}\n" for n in range(1, 9000)),
         },
@@ -61,13 +64,22 @@ def _meshes() -> dict[str, dict[str, Content]]:
             ),
             "an accessor of a billion zeros": _glb(_ZEROS),
         },
-        ".off": {"a promise of a billion corners": "OFF\n1000000000 1000000000 0\n0 0 0\n"},
+        ".gltf": {
+            "a buffer that is a pipe": lambda path: _with_pipe(path, _gltf("pipe")),
+            "a buffer that is another file": _gltf("../../../../../../etc/passwd"),
+            "a buffer elsewhere": _gltf("http://127.0.0.1:9/x"),
+        },
+        ".tar.gz": {"300 MB of zeros, packed": _packed_tar},
+        ".xyz": {"three million points": "0 0 0\n" * (3 * MB)},
+        ".dxf": {"two million lines": "0\nSECTION\n2\nENTITIES\n" + "0\nLINE\n" * (2 * MB)},
+        ".off": {"a billion corners in text": "OFF\n1000000000 1000000000 0\n0 0 0\n"},
         ".3mf": {"300 MB of blanks, packed": lambda path: _packed_blanks(path, "3D/3dmodel.model")},
         ".dae": {"entities of entities": _LAUGHS},
-        ".zip": {"300 MB of blanks, packed": lambda path: _packed_blanks(path, "a.stl")},
+        ".zip": {"an archive of 300 MB of blanks": lambda path: _packed_blanks(path, "a.stl")},
     }
 
 
+_TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 _LAUGHS = (
     '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY l0 "ha">'
     + "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 12))
@@ -93,6 +105,34 @@ def _glb(content: dict[str, object]) -> bytes:
     text = json.dumps({"asset": {"version": "2.0"}, **content}).encode()
     text += b" " * (-len(text) % 4)
     return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
+
+
+def _gltf(buffer: str) -> str:
+    """A triangle whose corners are in another file."""
+    return json.dumps(
+        {
+            "asset": {"version": "2.0"},
+            "buffers": [{"uri": buffer, "byteLength": 36}],
+            "bufferViews": [{"buffer": 0, "byteLength": 36}],
+            "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+            "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+            "nodes": [{"mesh": 0}],
+            "scenes": [{"nodes": [0]}],
+            "scene": 0,
+        }
+    )
+
+
+def _with_pipe(path: Path, content: str) -> None:
+    os.mkfifo(path.with_name("pipe"))
+    path.write_text(content)
+
+
+def _packed_tar(path: Path) -> None:
+    entry = tarfile.TarInfo("a.stl")
+    entry.size = 300 * MB
+    with tarfile.open(path, "w:gz") as archive, Path("/dev/zero").open("rb") as zeros:
+        archive.addfile(entry, zeros)
 
 
 def _sphere(levels: int, form: str, radius_m: float = 0.03) -> bytes:
@@ -124,6 +164,7 @@ def _pictures() -> dict[str, Content]:
         "noise": lambda folder: _picture(folder, bytes(range(256)) * 400),
         "a film of zeros": lambda path: _long_file(path.with_suffix(""), 20 * MB),
         "a picture that is a device": _picture_device,
+        "a picture that is a pipe": _picture_pipe,
     }
 
 
@@ -147,3 +188,8 @@ def _picture(folder: Path, content: bytes) -> None:
 def _picture_device(folder: Path) -> None:
     folder.mkdir()
     (folder / "view.png").symlink_to("/dev/zero")
+
+
+def _picture_pipe(folder: Path) -> None:
+    folder.mkdir()
+    os.mkfifo(folder / "view.png")

@@ -36,6 +36,7 @@ def text_cases() -> Iterator[Case]:
     yield from _CALIBRATION.cases({name: _yaml()[name] for name in ("noise", "aliases of aliases", "33 000 keys")})
     yield from _SETTINGS.cases({name: _yaml()[name] for name in ("15 MB", "merges of merges", "a Python object")})
     yield from _LENS.cases({"a matrix of a billion": _LENS_MATRIX, "noise behind the head": b"%YAML:1.0\n" + _NOISE})
+    yield from _LENS.cases({"a pipe": os.mkfifo})
     yield from _LOG.cases({**_json(), **_logs()})
     yield from _TIMED_TABLE.cases(_timed_tables())
     yield from _TIMED_JSON.cases({name: _json()[name] for name in ("16 MB of brackets", "20 kB of brackets")})
