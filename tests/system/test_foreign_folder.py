@@ -6,37 +6,25 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from pkgutil import iter_modules
 
 import pytest
 
 from tactile_lab.rigs.description import shipped_rigs
 
-NAMES = (
-    *("drivers", "sessions", "calibration", "tactile_lab", "tests"),
-    *(
-        "numpy",
-        "scipy",
-        "cv2",
-        "gtsam",
-        "yaml",
-        "typer",
-        "click",
-        "rich",
-        "can",
-        "serial",
-        "mcap",
-        "mujoco",
-        "pydantic",
-    ),
-    *("rtde_control", "rtde_receive", "dashboard_client", "pysoem", "threadpoolctl", "trimesh", "websockets", "mcap"),
-    *("json", "logging", "typing", "random", "types", "queue", "socket", "signal", "select", "struct", "platform"),
+NAMES = sorted(
+    name
+    for name in {"tests", *sys.stdlib_module_names, *(module.name for module in iter_modules())}
+    if name.isidentifier() and not name.startswith("__")
 )
+"""Every module of the standard library, our packages, and all that is installed beside them."""
 
 
 @pytest.fixture
 def foreign_folder(tmp_path: Path) -> Path:
     folder = tmp_path / "work"
     folder.mkdir()
+    assert {"drivers", "sessions", "numpy", "rtde_control", "json"} <= set(NAMES)
     for name in NAMES:
         (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'a').write(__name__)\n")
     return folder
