@@ -73,8 +73,13 @@ class HandSetup(StrictModel):
         return self.hand.model_copy(update=changes)
 
     def _gains(self, file: Path) -> GainTable:
-        driven = self.form().driven
-        table = load_gains(file, driven).table
+        form = self.form()
+        driven, published = form.driven, load_gains(file, form.driven)
+        if published.told_side not in (None, form.side):
+            sides = f"is of a {published.told_side} hand, and the hand is a {form.side} one"
+            what = f"{sides}: motors would turn the wrong way"
+            raise ConfigurationError(what, where=str(file), hint="Name the table of the connected hand")
+        table = published.table
         strongest = max(driven, key=lambda joint: table.of(joint).max_pwm)
         if self.hand.demand == "pwm" and (most := table.of(strongest).max_pwm) > MAX_PWM:
             what = f"max_force of {strongest} is {most:g}, but the largest duty cycle is {MAX_PWM}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +13,9 @@ from drivers.core.configuration import StrictModel
 from drivers.core.errors import ConfigurationError
 from drivers.shadow.model.motors import DRIVEN_JOINTS
 from drivers.shadow.protocol.motor_data import MAX_TORQUE
+from drivers.shadow.protocol.palm_images import Side
+
+_SIDES: Mapping[str, Side] = {"lh_": "left", "rh_": "right"}
 
 
 class JointGains(StrictModel):
@@ -73,10 +77,12 @@ class PublishedGains:
     Attributes:
         table: gains of every driven joint, as magnitudes.
         backwards: joints whose gains are negative: a positive demand turns them towards smaller angles.
+        told_side: side of the hand by the names of its joints, such as ``lh_FFJ0``; None where they tell none.
     """
 
     table: GainTable
     backwards: tuple[str, ...]
+    told_side: Side | None = None
 
 
 class _Pid(StrictModel):
@@ -106,8 +112,8 @@ def load_gains(path: Path, driven: tuple[str, ...] = DRIVEN_JOINTS) -> Published
         driven: the joints that the hand has; gains of others are left out.
 
     Raises:
-        ConfigurationError: the file cannot be used, a joint is missing or named twice, or the gains of one joint
-            have different signs.
+        ConfigurationError: the file cannot be used, a joint is missing or named twice, the joints are of both sides,
+            or the gains of one joint have different signs.
     """
     content = strict_yaml.load(path)
     if not isinstance(content, dict):
@@ -122,7 +128,18 @@ def load_gains(path: Path, driven: tuple[str, ...] = DRIVEN_JOINTS) -> Published
         raise ConfigurationError(what, where=str(path), hint=hint)
     gains = {joint: _gains(pid, joint, path) for joint, pid in named.items() if joint in driven}
     backwards = tuple(joint for joint in driven if named[joint].p < 0.0)
-    return PublishedGains(GainTable(exceptions=gains), backwards)
+    return PublishedGains(
+        GainTable(exceptions=gains), backwards, _told_side([each.joint for each in controllers], path)
+    )
+
+
+def _told_side(joints: Sequence[str], path: Path) -> Side | None:
+    sides = {_SIDES[joint[:3].lower()] for joint in joints if joint[:3].lower() in _SIDES}
+    if len(sides) > 1:
+        raise ConfigurationError(
+            "has joints of a left and of a right hand", where=str(path), hint="Use one hand's table"
+        )
+    return next(iter(sides), None)
 
 
 def _gains(pid: _Pid, joint: str, path: Path) -> JointGains:

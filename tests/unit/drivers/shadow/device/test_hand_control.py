@@ -116,13 +116,15 @@ def test_published_gains_are_read_with_their_signs(serial: str, lab_data: Path) 
         assert (joint in published.backwards) == (entry["pid"]["p"] < 0)
 
 
+_USUAL = {"p": 4500.0, "i": 0.0, "d": 50.0, "i_clamp": 0.0, "max_force": 600.0, "position_deadband": 0.003}
+
+
 def published(**changes: dict[str, float]) -> dict[str, dict[str, object]]:
     """A file like Shadow's for all joints, with changes by joint."""
-    usual = {"p": 4500.0, "i": 0.0, "d": 50.0, "i_clamp": 0.0, "max_force": 600.0, "position_deadband": 0.003}
     return {
         f"sh_rh_{joint.lower()}_position_controller": {
             "joint": f"rh_{joint}",
-            "pid": usual | changes.get(joint, {}),
+            "pid": _USUAL | changes.get(joint, {}),
             "type": "sr_mechanism_controllers/SrhJointPositionController",
         }
         for joint in DRIVEN_JOINTS
@@ -145,6 +147,10 @@ def write(tmp_path: Path, content: object) -> Path:
         (published(FFJ3={"p": 100.0, "d": -50.0}), "of FFJ3 have different signs"),
         (published(FFJ3={"p": 0.0}), "have different signs"),
         (published(FFJ3={"max_force": -1.0}), "max_force"),
+        (
+            published() | {"sh_rh_ffj0_position_controller": {"joint": "lh_FFJ0", "pid": _USUAL}},
+            "of a left and of a right hand",
+        ),
     ],
 )
 def test_a_file_of_gains_that_can_not_be_used_is_refused(content: object, words: str, tmp_path: Path) -> None:

@@ -87,6 +87,15 @@ def test_a_typing_error_in_a_file_is_named(tmp_path: Path, file: str, change: tu
         setup_of(folder).check_files()
 
 
+def test_a_table_of_gains_of_the_other_side_is_refused_before_motors_turn_the_wrong_way(tmp_path: Path) -> None:
+    left = next(kind for kind in FOLDERS if kind.name == "lh_E_v3")
+    folder, other = write_folder(tmp_path / "hand", left), write_folder(tmp_path / "other", FULL_RIGHT)
+    folder.gains.write_text(other.gains.read_text())
+    words = r"_PWM\.yaml: is of a right hand, and the hand is a left one: .*\. Name the table of the connected hand"
+    with pytest.raises(ConfigurationError, match=words):
+        setup_of(folder).check_files()
+
+
 def test_the_family_has_the_published_proportions() -> None:
     hands = family()
     assert len(hands) == 121
