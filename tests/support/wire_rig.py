@@ -31,7 +31,7 @@ def wire_rig(folder: Path, shipped: str = "sim-wire", **changes: Any) -> Path:
     for number, wire in enumerate(wires["fingertips"].values()):
         wire["host"] = f"{net}.{11 + number}"
     content["hand"] |= {"cycle_s": 0.004}
-    content["base"] |= {"lost_limit": 100}
+    content["base"] |= {"lost_limit": 100} | ({"watchdog_hz": 2.0} if shipped == "sim-ur" else {})
     content["conductor"]["probing"] = {"top": False}  # 15 s of real time in every session
     content["conductor"]["safety"] = {"tip_stale_s": 2.0, "stale_s": 5.0, "first_moves_scale": 1.0}
     path = folder / "wire.yaml"
