@@ -106,8 +106,8 @@ def _unlikely(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     return [
         Doubt(
             "unlikely-slip",
-            f"the slip before grasp {step + 2} is improbable ({probabilities[step]:.0e}): was the object moved, or is a "
-            "grasp placed wrongly?",
+            f"the slip before grasp {step + 2} is improbable ({probabilities[step]:.0e}): was the object moved, or "
+            "is a grasp placed wrongly?",
             (int(step) + 1,),
             grave=bool(doubtful[step]),
         )
