@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_lab.report import listings, sections
+from tactile_lab.report import doubts, listings, sections
 from tactile_lab.report.content import ReportContent
 from tactile_lab.report.markup import Markup, element, join
 
@@ -25,6 +25,7 @@ def page(content: ReportContent) -> str:
         sections.head(content),
         listings.stops_card(content.course),
         sections.key_figures(content),
+        doubts.doubts_card(content),
         sections.shape_section(content),
         sections.tracking_section(content),
         listings.grasp_section(content),

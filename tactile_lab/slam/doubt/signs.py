@@ -131,8 +131,8 @@ def _large_together(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     if chance >= _TOGETHER:
         return []
     words = (
-        "the slips are larger together than the motion model allows: grasps are placed wrongly, or `motion` is set too "
-        "small"
+        "the slips are larger together than the motion model allows: grasps are placed wrongly, or the setting motion "
+        "is too small"
     )
     return [Doubt("large-slips", words)]
 

@@ -179,6 +179,23 @@ def test_same_session_gives_the_same_page(tmp_path: Path) -> None:
     assert report.write(folder).read_bytes() == first
 
 
+def test_doubts_and_alternatives_are_on_the_page(tmp_path: Path) -> None:
+    folder = make_session(tmp_path, 2)
+    path = folder / "results" / "slam.json"
+    slam = json.loads(path.read_text(encoding="utf-8"))
+    words = "the slip before grasp 3 is improbable (1e-07)"
+    slam["doubts"] = [{"name": "unlikely-slip", "words": words, "grasps": [2], "grave": True}]
+    placing = {"probability": 0.12, "turn_rad": 1.0, "shift_m": 0.021, "rms_m": 0.0042, "world_T_object": []}
+    slam["alternatives"] = [{**placing, "grasps": [2, 3]}, {**placing, "grasps": [0, 3]}]
+    path.write_text(json.dumps(slam), encoding="utf-8")
+    texts = Page(report.write(folder).read_text(encoding="utf-8")).texts
+    assert words in texts
+    assert [text for text in texts if text in {"3 to 4", "1, 4", "12%", "57°", "21 mm", "4.2 mm"}] == [
+        *("3 to 4", "12%", "57°", "21 mm", "4.2 mm"),
+        *("1, 4", "12%", "57°", "21 mm", "4.2 mm"),
+    ]
+
+
 def test_session_without_truth_says_so(tmp_path: Path) -> None:
     words = Page(report.write(make_session(tmp_path, 2, with_truth=False)).read_text(encoding="utf-8")).texts
     assert "not evaluated" in words

@@ -62,7 +62,7 @@ def test_many_large_slips_are_told_together_and_one_is_not() -> None:
         drifting = turned(drifting, slice(grasp, None), (0.016, 0.0, 0.45 if grasp % 4 else -0.45))
     (found,) = [doubt for doubt in signs(drifting, NOISE) if doubt.name == "large-slips"]
     assert found.grave
-    assert "`motion` is set too small" in found.words
+    assert "the setting motion is too small" in found.words
     assert "large-slips" not in names(turned(best, slice(6, None), (0.05, 0.0, 0.5)))
 
 
