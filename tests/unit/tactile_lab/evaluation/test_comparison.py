@@ -91,3 +91,11 @@ def test_tables_and_plot_name_every_method() -> None:
     assert len(bars) == 4
     assert min(figure.mean.low for one in summaries for figure in one.figures if figure.mean) < 0.0
     assert min(float(bar.get("x1", "nan")) for bar in bars) == 170.0  # no error is below zero
+
+
+def test_an_interval_excludes_zero_on_either_side_by_more_than_the_margin() -> None:
+    above, below, around = Interval(3.0, 2.0, 4.0), Interval(-3.0, -4.0, -2.0), Interval(0.5, -1.0, 2.0)
+    assert [one.excludes_zero() for one in (above, below, around)] == [True, True, False]
+    assert [one.excludes_zero(1.0) for one in (above, below, around)] == [True, True, False]
+    assert [one.excludes_zero(2.5) for one in (above, below, around)] == [False, False, False]
+    assert not Interval(3.0, None, None).excludes_zero()

@@ -248,3 +248,9 @@ def test_the_verdict_says_that_rotations_of_symmetry_are_ignored() -> None:
     assert verdict({"registration_rms_mm": 2.0, "symmetry_turns": None}) == "passed: at most 5 mm"
     told = verdict({"registration_rms_mm": 9.0, "symmetry_turns": 6})
     assert told == "failed: above 5 mm, ignoring rotations about its axis of symmetry"
+
+
+def test_the_outline_of_a_hollow_object_is_its_outer_wall() -> None:
+    tube = trimesh.creation.annulus(r_min=0.02, r_max=0.03, height=0.05)
+    radii_m = np.linalg.norm(horizontal_outline(tube, 0.0), axis=1)
+    assert radii_m == pytest.approx(0.03, abs=1e-3)

@@ -98,3 +98,10 @@ def test_what_was_felt_is_judged_by_what_it_said_of_its_own_error() -> None:
     assert turns == pytest.approx(0.68, abs=0.07)
     assert "odometry_scale by 1." in found.in_words()
     assert FeltSlips().scale is None
+
+
+def test_one_dropped_object_does_not_widen_the_noise_of_all() -> None:
+    missed = np.zeros((20, 3))
+    missed[7] = [0.4, 0.0, 2.0]
+    found = FeltSlips(missed, np.tile([0.001, 0.02], (20, 1)))
+    assert found.scale == pytest.approx(np.sqrt(2 * 3.0**2 / 60))

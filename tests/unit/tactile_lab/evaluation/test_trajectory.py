@@ -14,7 +14,7 @@ from drivers.core.errors import SessionError
 from drivers.core.poses import planar, transform_points
 from tactile_lab.evaluation.files.trajectory_file import COLUMNS, Trajectory, read_trajectory, trajectory_text
 from tactile_lab.evaluation.loops import wrong_loops
-from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM, registration_rms_mm, registration_verdict
 from tactile_lab.evaluation.trajectory import aligned_poses, estimate_T_truth, pose_errors
 
 OFFSET = Pose3(Rot3.RzRyRx(0.1, -0.2, 0.7), np.array([0.01, -0.03, 0.02]))
@@ -196,3 +196,17 @@ def test_loops_without_truth_can_not_be_judged() -> None:
     assert wrong_loops([loop(RIGHT)], estimate, (*TRUTH[:3], None, TRUTH[4])) is None
     assert wrong_loops([loop(RIGHT)], estimate, (None,) * 5) is None
     assert wrong_loops([], estimate, TRUTH) == 0
+
+
+def test_drift_begins_at_the_grasp_whose_frames_are_aligned() -> None:
+    """The first two grasps were not placed: from the third on the error grows by 2 mm each."""
+    drifting = [pose.compose(Pose3(Rot3(), np.array([0.002 * i, 0.0, 0.0]))) for i, pose in enumerate(TRUTH[2:])]
+    errors = pose_errors([None, None, *drifting], TRUTH)
+    assert errors is not None
+    assert errors.aligned_at == 2
+    assert errors.drift_mm_per_grasp == pytest.approx(2.0)
+
+
+def test_a_registration_error_at_the_limit_passes() -> None:
+    assert registration_verdict(FAILURE_LIMIT_MM, None)[0]
+    assert not registration_verdict(FAILURE_LIMIT_MM + 1e-6, None)[0]

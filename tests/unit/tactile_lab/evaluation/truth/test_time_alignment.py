@@ -55,3 +55,18 @@ def test_clocks_that_are_far_apart_are_told_not_guessed() -> None:
     found = clock_offset(palm, stamps, places, [(0.0, 7.0)])
     assert found.offset_ms is None
     assert "no offset within 300 ms" in found.reason
+
+
+def test_the_stated_deviation_follows_from_noise_and_speed() -> None:
+    """Without rotation an offset moves the object by its speed relative to the mean, against the noise per axis."""
+    sigma_m, hand_s, camera_s = 0.0003, np.arange(0.0, 8.0, 0.02), np.arange(0.0, 8.0, 1 / 30)
+    level = np.tile(np.eye(3), (len(hand_s), 1, 1))
+
+    def along(stamps_s: Array) -> Array:
+        return np.column_stack([0.05 * np.sin(1.3 * stamps_s), 0 * stamps_s, 0.2 + 0 * stamps_s])
+
+    noise = sigma_m * np.random.default_rng(1).standard_normal((len(camera_s), 2))
+    found = clock_offset(Track(hand_s, along(hand_s), level), camera_s, along(camera_s)[:, :2] + noise, [(0.0, 8.0)])
+    used_s = camera_s[(camera_s >= 0.3) & (camera_s <= hand_s[-1] - 0.3)]
+    speed_m_s = 0.05 * 1.3 * np.cos(1.3 * used_s)
+    assert found.sigma_ms == pytest.approx(1e3 * sigma_m / np.linalg.norm(speed_m_s - speed_m_s.mean()), rel=0.15)
