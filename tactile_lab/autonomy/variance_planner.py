@@ -22,6 +22,7 @@ from drivers.core.observability import planar_observability
 from drivers.shadow.closing.closing import LEANING, Closing
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import ContactHeight, GraspPlan
+from tactile_lab.slam.doubt.known_part import LARGEST_SIGMA_m, known_part
 from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays, ModelledObject, outward, ring_of_candidates
 from tactile_lab.slam.exploration.expected_information import InformationSettings
 from tactile_lab.slam.exploration.policies import POLICIES
@@ -29,6 +30,7 @@ from tactile_lab.slam.exploration.policy import Surface
 from tactile_lab.slam.exploration.rewards import RatedCandidate, explored_share, rate
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet, LEAST_SIGMA_rad
 
 
 class ExplorationSettings(StrictModel):
@@ -118,7 +120,11 @@ def known_shape(
             share always follows the field, see :func:`_as_far_as_felt`.
     """
     try:
-        extracted = extract_surface(field, dimension, settings) if mesh is None else _as_far_as_felt(mesh, field)
+        extracted = (
+            extract_surface(field, dimension, settings)
+            if mesh is None
+            else _as_far_as_felt(mesh, field, -origin_height_m)
+        )
     except ShapeError:
         return KnownShape(field, dimension, origin_height_m, np.zeros(2), 0.0)
     surface = Surface.of(extracted)
@@ -135,14 +141,20 @@ def extract_surface(field: Gpis, dimension: int, settings: ExplorationSettings) 
     return extract_mesh(field, resolution_m=settings.mesh_resolution_m)
 
 
-def _as_far_as_felt(mesh: SurfaceMesh, field: Gpis) -> SurfaceMesh:
-    """A model's surface with the field's standard deviations.
+def _as_far_as_felt(mesh: SurfaceMesh, field: Gpis, floor_m: float) -> SurfaceMesh:
+    """A model's surface with the field's standard deviations, no small ones where it was not touched.
 
     The model infers a whole face from a few contacts, with a small sigma if the model is right. Exploration must find
     out whether it is: so knowledge is measured by the field, whose certainty decreases with the distance from contacts.
-    The field's values are distances, so their standard deviation is the surface's.
+    The field's values are distances, so their standard deviation is the surface's. Where no contact supports the
+    surface (:mod:`tactile_lab.slam.doubt.known_part`) it is not known, whatever the field says.
     """
-    return replace(mesh, sigma_m=field.sigma_inflation * np.sqrt(field.variance(mesh.vertices)))
+    sigma_m = field.sigma_inflation * np.sqrt(field.variance(mesh.vertices))
+    seen = field.observations
+    count = len(field.contacts_m)
+    sigmas = seen.value_sigma_m[:count], np.full(count, LEAST_SIGMA_rad)
+    part = known_part(mesh, ContactSet(field.contacts_m, field.normals, *sigmas), floor_m)
+    return replace(mesh, sigma_m=np.where(part.known, sigma_m, np.maximum(sigma_m, LARGEST_SIGMA_m)))
 
 
 def closing_rays(table: Closing) -> ClosingRays:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from tactile_lab.slam.doubt.halves import exchanged
 from tactile_lab.slam.doubt.known_part import REACH_ALONE_m, REACH_m, known_part, with_guesses_told
+from tactile_lab.slam.doubt.missing_parts import missing_parts
 from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, turned_by_symmetry
 from tactile_lab.slam.doubt.signs import signs
 from tactile_lab.slam.doubt.sizes import unknown_sizes
@@ -72,12 +73,13 @@ def assess(
     if tracker is None:
         return Assessment("lost", shape, None, (), ())
     contact_map = tracker.refined
-    share = None
+    share, missing = None, list[Doubt]()
     if shape is not None:
         stands = settings.freedom == "table"
         floor_m = -origin_height_m if stands else None
         reach_m = REACH_m if sum(grasp.used for grasp in contact_map.placed) >= LEAST_GRASPS else REACH_ALONE_m
-        part = known_part(shape, contact_map.contacts, floor_m, reach_m=reach_m)
+        part = known_part(shape, contact_map.contacts, floor_m, contact_map.free_points_m, reach_m=reach_m)
+        missing = missing_parts(contact_map, shape, floor_m) if isinstance(shape, SurfaceMesh) else []
         shape, share = with_guesses_told(shape, part), part.share
     symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= LEAST_KNOWN_SHARE else None
     if has_ended:
@@ -91,6 +93,7 @@ def assess(
         *_refused(refused),
         *_few(len(refused) - sum(refused)),
         *unknown_sizes(shape),
+        *missing,
         *(
             [Doubt("symmetry", symmetry.words, grave=False)]
             if symmetry is not None and symmetry.interchangeable

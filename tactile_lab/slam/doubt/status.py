@@ -28,11 +28,12 @@ DoubtName: TypeAlias = Literal[
     "refused-grasps",
     "few-grasps",
     "unknown-size",
+    "missing-part",
     "rivals",
     "symmetry",
 ]
 
-_PARTIAL: tuple[DoubtName, ...] = ("refused-grasps", "few-grasps", "unknown-size")
+_PARTIAL: tuple[DoubtName, ...] = ("refused-grasps", "few-grasps", "unknown-size", "missing-part")
 """Doubts with which an estimate is not complete."""
 
 LEAST_KNOWN_SHARE = 0.8

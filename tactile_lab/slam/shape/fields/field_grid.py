@@ -27,6 +27,18 @@ class Field(Protocol):
         """The field at points of shape (q, d)."""
 
 
+class SurfaceField(Field, Protocol):
+    """A field whose zero level is a surface that contacts tell of."""
+
+    @property
+    def contacts_m(self) -> Array:
+        """Shape (n, d)."""
+
+    @property
+    def sigma_inflation(self) -> float:
+        """How many times larger than predicted the standard deviation of the surface is."""
+
+
 class FieldGrid:
     """Values, gradients and variances of a field on a grid, with linear interpolation between the nodes.
 

@@ -20,6 +20,7 @@ ShapePart: TypeAlias = Literal[
     "polyhedron",
     "prism",
     "turned",
+    "turned with a part",
     "standing field",
     "sections",
     "strays",

@@ -21,6 +21,7 @@ from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.shape.solids.turned import Turned
+from tactile_lab.slam.shape.solids.turned_with_part import TurnedWithPart
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, mesh_arrays
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
@@ -29,7 +30,7 @@ _FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
 _NOISE_SIGMAS = 2.0
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
-_LARGEST_SHARE_OFF_TURNED = 0.01
+_LARGEST_SHARE_OFF_TURNED, _LARGEST_SHARE_OFF_WITH_PART = 0.01, 0.05
 _KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
 """Cost of a contact that is centimetres off the surface: that of one outlier among twenty good contacts."""
@@ -83,9 +84,21 @@ def best_spatial_shape(
         return best
     if not _beyond_doubt(most, gpis) and without.isdisjoint({"field", "standing field", "sections"}):
         best, most = _likelier(_sectioned(gpis, floor_m), best, most)
+    return _revolving(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+
+
+def _revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:
+    """The solid of revolution, with a part beside it or without, whichever has most evidence; None if neither has
+    enough.
+    """
+    without = gpis.settings.without
     if "turned" in without:
-        return best
-    return _turned(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+        return None
+    body = _turned(gpis, free_points_m, floor_m, at_least=at_least)
+    if "turned with a part" in without:
+        return body
+    most = at_least if body is None else body.log_evidence
+    return _turned_with_part(gpis, free_points_m, floor_m, at_least=most) or body
 
 
 def _sectioned(gpis: Gpis, floor_m: float) -> FittedShape | None:
@@ -115,6 +128,18 @@ def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least
     if not isinstance(shape, Turned):
         return None
     off = _LARGEST_SHARE_OFF_TURNED
+    evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if evidence > at_least else None
+
+
+def _turned_with_part(
+    gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float
+) -> FittedShape | None:
+    """The solid of revolution with a part beside it, if it has more evidence, as :func:`_turned`."""
+    shape = _try_make(lambda: TurnedWithPart.fit(gpis, floor_m, free_points_m))
+    if shape is None:
+        return None
+    off = _LARGEST_SHARE_OFF_WITH_PART
     evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
     return shape if evidence > at_least else None
 

@@ -12,24 +12,22 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
+from tactile_lab.slam.shape.fields.posterior import Prediction
+from tactile_lab.slam.shape.fields.settings import GpisSettings
+from tactile_lab.slam.shape.solids.axis import SIDEWAYS, find_axis, misfit_around, split, to_profile
 from tactile_lab.slam.shape.solids.mesh import area_weighted_normals
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
 from tactile_lab.slam.shape.solids.revolving import generatrix, revolve
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour
 
-_LEAST_WALL_CONTACTS = 12
-_LARGEST_GAP_rad = np.deg2rad(150.0)
-"""Contacts on the walls must surround the axis: a smaller part of a circle may also belong to another shape."""
-_SIDEWAYS = 0.5
-"""A contact tells about the axis if its unit normal's horizontal part is longer than this."""
-_ROUNDS, _OUTLYING_SIGMAS = 8, 4.0
 _LARGEST_MISFIT = 2.0
 """Largest mean square, in variances, of what normals have across the planes through the axis; about one if it exists.
 A hexagonal prism has 9, and is not worth the search for its profile.
@@ -81,21 +79,47 @@ class Turned:
             ShapeError: the contacts are in the plane, do not surround an axis, or their normals do not meet it.
         """
         contacts = contacts_of(gpis)
-        start_m, sigma_m = _axis(contacts)
-        if _around(contacts, start_m)[0] > _LARGEST_MISFIT:
+        start_m, sigma_m = find_axis(contacts)
+        if misfit_around(contacts, start_m)[0] > _LARGEST_MISFIT:
             raise ShapeError("the contacts' normals do not meet one vertical axis")
         axis_m = _likeliest_axis(gpis, contacts, start_m)
-        half = _half(gpis, contacts, axis_m).optimise(max_iterations=_KERNEL_STEPS)
+        half = _half(gpis.settings, contacts, axis_m).optimise(max_iterations=_KERNEL_STEPS)
         price = 2 * np.log(_AXIS_RANGE_m / (np.sqrt(2 * np.pi) * sigma_m))
-        evidence = half.log_marginal_likelihood() + _around(contacts, axis_m)[1] - price
+        evidence = half.log_marginal_likelihood() + misfit_around(contacts, axis_m)[1] - price
         free_m = np.empty((0, 3)) if free_points_m is None else np.reshape(free_points_m, (-1, 3))
-        return cls(axis_m, sigma_m, half, _to_profile(free_m, axis_m), floor_m, float(evidence))
+        return cls(axis_m, sigma_m, half, to_profile(free_m, axis_m), floor_m, float(evidence))
 
     @cached_property
     def profile(self) -> Gpis:
         """The field of the whole section through the axis, with all that is known of places without contacts."""
         section = _both_halves(self.half, self.floor_m)
         return in_one_piece(outside_at(section, np.vstack([self.free_m, self.free_m * [-1, 1]])), _SECTION_GRID_m)
+
+    @cached_property
+    def contacts_m(self) -> Array:
+        """Contacts at their distances and heights, those farthest out on all sides of the axis, shape (n, 3)."""
+        reach_m, heights_m = self.half.contacts_m[np.argsort(-self.half.contacts_m[:, 0])].T
+        quarters = np.arange(len(reach_m)) * np.pi / 2
+        level = reach_m[:, None] * np.column_stack([np.cos(quarters), np.sin(quarters)])
+        return np.column_stack([level + self.axis_m, heights_m])
+
+    def half_of(self, contacts: WeightedContacts, chosen: NDArray[np.bool_]) -> Gpis:
+        """The field of the profile of some contacts in space, about this axis and with this kernel."""
+        some = WeightedContacts(*(each[chosen] for each in vars(contacts).values()))
+        half = _half(self.half.settings, some, self.axis_m)
+        return half.with_log_parameters(self.half.kernel.log_parameters)
+
+    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
+        """The field of the profile at points of shape (q, 3); its variance is that of the surface."""
+        found = self.profile.predict(to_profile(points_m, self.axis_m), gradient=gradient, variance=variance)
+        slope, spread = np.empty((0, 3)), found.variance_m2
+        if gradient:
+            arms_m = points_m[:, :2] - self.axis_m
+            out = arms_m / np.maximum(np.linalg.norm(arms_m, axis=1, keepdims=True), 1e-9)
+            slope = np.column_stack([found.gradient[:, :1] * out, found.gradient[:, 1]])
+        if variance:
+            spread = self.profile.sigma_inflation**2 * spread + self.axis_sigma_m**2
+        return Prediction(found.mean_m, slope, spread)
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
         """Raises ShapeError: a solid has no outline."""
@@ -117,45 +141,13 @@ class Turned:
         return SurfaceMesh(vertices_m, turned.triangles, sigma_m, normals, is_closed=section.is_closed)
 
 
-def _axis(contacts: WeightedContacts) -> tuple[Array, float]:
-    """The point next to the walls' normals, seen from above, and its standard deviation, by robust least squares.
-
-    Raises:
-        ShapeError: the contacts do not surround it.
-    """
-    walls = np.flatnonzero(np.linalg.norm(contacts.normals[:, :2], axis=1) > _SIDEWAYS)
-    if len(walls) < _LEAST_WALL_CONTACTS:
-        raise ShapeError(f"{len(walls)} contacts on walls are too few for an axis")
-    points_m, normals = contacts.points_m[walls, :2], contacts.normals[walls, :2]
-    across = np.column_stack([-normals[:, 1], normals[:, 0]])
-    offsets_m, weights = np.sum(across * points_m, axis=1), np.ones(len(walls))
-    for _ in range(_ROUNDS):
-        axis_m = np.linalg.lstsq(np.sqrt(weights)[:, None] * across, np.sqrt(weights) * offsets_m, rcond=None)[0]
-        reach_m = np.linalg.norm(points_m - axis_m, axis=1)
-        variance = 1 / contacts.point_weights[walls] + reach_m**2 / contacts.normal_weights[walls]
-        misses = (offsets_m - across @ axis_m) ** 2 / variance
-        weights = np.maximum(1 - misses / _OUTLYING_SIGMAS**2, 0.0) ** 2 / variance
-    if _largest_gap_rad((points_m - axis_m)[weights > 0]) > _LARGEST_GAP_rad:
-        raise ShapeError("the contacts do not surround an axis")
-    information = (weights[:, None] * across).T @ across
-    return axis_m, float(np.sqrt(np.diag(np.linalg.inv(information)).max()))
-
-
-def _largest_gap_rad(arms_m: Array) -> float:
-    """Largest angle between neighbouring directions of vectors, shape (n, 2)."""
-    if len(arms_m) < _LEAST_WALL_CONTACTS:
-        return 2 * np.pi
-    angles = np.sort(np.arctan2(arms_m[:, 1], arms_m[:, 0]))
-    return float(np.diff(angles, append=angles[0] + 2 * np.pi).max())
-
-
 def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> Array:
     """The axis of largest evidence, with the kernel that is best for the first guess."""
-    kernel = _half(gpis, contacts, start_m).optimise(max_iterations=_KERNEL_STEPS).kernel.log_parameters
+    kernel = _half(gpis.settings, contacts, start_m).optimise(max_iterations=_KERNEL_STEPS).kernel.log_parameters
 
     def cost(axis_m: Array) -> float:
-        half = _half(gpis, contacts, axis_m).with_log_parameters(kernel)
-        return -half.log_marginal_likelihood() - _around(contacts, axis_m)[1]
+        half = _half(gpis.settings, contacts, axis_m).with_log_parameters(kernel)
+        return -half.log_marginal_likelihood() - misfit_around(contacts, axis_m)[1]
 
     simplex = start_m + _AXIS_STEP_m * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     found = minimize(
@@ -172,39 +164,12 @@ def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> A
     return np.asarray(found.x)
 
 
-def _to_profile(points_m: Array, axis_m: Array) -> Array:
-    """Places of shape (q, 3) as (distance from the axis, height), shape (q, 2)."""
-    return np.column_stack([np.linalg.norm(points_m[:, :2] - axis_m, axis=1), points_m[:, 2]])
-
-
-def _split(contacts: WeightedContacts, axis_m: Array) -> tuple[Array, Array]:
-    """The contacts' normals within the planes through the axis, shape (n, 2), and across these planes, shape (n,)."""
-    arms_m = contacts.points_m[:, :2] - axis_m
-    out = arms_m / np.maximum(np.linalg.norm(arms_m, axis=1, keepdims=True), 1e-9)
-    level = contacts.normals[:, :2]
-    within = np.column_stack([np.sum(level * out, axis=1), contacts.normals[:, 2]])
-    return within, level[:, 1] * out[:, 0] - level[:, 0] * out[:, 1]
-
-
-def _half(gpis: Gpis, contacts: WeightedContacts, axis_m: Array) -> Gpis:
+def _half(settings: GpisSettings, contacts: WeightedContacts, axis_m: Array) -> Gpis:
     """The field of the profile from the contacts, all at positive distances."""
-    normals, _ = _split(contacts, axis_m)
+    normals, _ = split(contacts, axis_m)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     sigmas = contacts.point_weights**-0.5, contacts.normal_weights**-0.5
-    return Gpis.fit(_to_profile(contacts.points_m, axis_m), normals, *sigmas, gpis.settings)
-
-
-def _around(contacts: WeightedContacts, axis_m: Array) -> tuple[float, float]:
-    """Mean square, in variances, and log density of what the normals have across the planes through the axis.
-
-    An error of the point along the circle turns the plane that the normal is compared with.
-    """
-    within, across = _split(contacts, axis_m)
-    reach_m = np.linalg.norm(contacts.points_m[:, :2] - axis_m, axis=1)
-    turn = within[:, 0] / np.maximum(reach_m, contacts.point_weights**-0.5)
-    variance = 1 / contacts.normal_weights + turn**2 / contacts.point_weights
-    squares = across**2 / variance
-    return float(squares.mean()), float(-0.5 * np.sum(squares + np.log(2 * np.pi * variance)))
+    return Gpis.fit(to_profile(contacts.points_m, axis_m), normals, *sigmas, settings)
 
 
 def _both_halves(half: Gpis, floor_m: float) -> Gpis:
@@ -257,7 +222,7 @@ def _overhang(walls: Array, sigma_rad: Array) -> float:
     """Sine of the angle by which outer walls with these normals, shape (n, 2), face the table; zero if they may be
     upright or stand on a wider foot.
     """
-    outer = walls[:, 0] > _SIDEWAYS
+    outer = walls[:, 0] > SIDEWAYS
     if not outer.any():
         return 0.0
     weights = sigma_rad[outer] ** -2

@@ -12,8 +12,7 @@ from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
-from tactile_lab.slam.shape.fields.field_grid import FieldGrid
-from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.field_grid import FieldGrid, SurfaceField
 from tactile_lab.slam.shape.surfaces.level_sets import level_mesh, level_outlines
 from tactile_lab.slam.shape.surfaces.sampling import polygon_area
 
@@ -77,25 +76,25 @@ class SurfaceMesh:
     known: Mask | None = None
 
 
-def extract_contour(gpis: Gpis, *, resolution_m: float = 0.001, largest_margin_m: float = 0.060) -> Contour:
+def extract_contour(field: SurfaceField, *, resolution_m: float = 0.001, largest_margin_m: float = 0.060) -> Contour:
     """The outline of the object in a planar field.
 
     Args:
-        gpis: a field fitted in two dimensions.
+        field: a field fitted in two dimensions.
         resolution_m: spacing of the grid on which the outline is found, before it is refined to the zero level.
         largest_margin_m: the grid is extended around the contacts until the outline is closed, at most by this.
 
     Raises:
         ShapeError: no point near the contacts is inside, or the grid would be too large.
     """
-    solid = _solid(gpis, resolution_m, largest_margin_m)
+    solid = _solid(field, resolution_m, largest_margin_m)
     places = max(level_outlines(solid.values_m), key=lambda loop: abs(polygon_area(loop)))
-    points, _, sigma = _refine(gpis, solid.lower_m + resolution_m * places, resolution_m)
+    points, _, sigma = _refine(field, solid.lower_m + resolution_m * places, resolution_m)
     return _counter_clockwise(Contour(points, sigma, solid.is_closed))
 
 
 def extract_mesh(
-    gpis: Gpis,
+    field: SurfaceField,
     *,
     resolution_m: float = 0.003,
     largest_margin_m: float = 0.060,
@@ -108,16 +107,16 @@ def extract_mesh(
     even if the field continues below. ``ceiling_m`` likewise is the height of a flat top, if any. Both ends have sharp
     rims, and their sigma is :data:`LEVEL_SIGMA_m`.
     """
-    solid = _solid(gpis, resolution_m, largest_margin_m).between(floor_m, ceiling_m, resolution_m)
+    solid = _solid(field, resolution_m, largest_margin_m).between(floor_m, ceiling_m, resolution_m)
     places, faces = level_mesh(solid.values_m)
     rough = solid.lower_m + resolution_m * places
-    vertices, normals, sigma = _refine(gpis, rough, resolution_m)
+    vertices, normals, sigma = _refine(field, rough, resolution_m)
     for level_m, side in ((floor_m, -1.0), (ceiling_m, 1.0)):
         if level_m is not None:
             flat = side * rough[:, 2] > side * level_m - _FLAT * resolution_m
             vertices = _level(vertices, rough, flat, level_m, side)
             rim = flat & np.isin(np.arange(len(flat)), faces[~flat[faces].all(axis=1)])
-            vertices[rim] = _move_sideways(gpis, vertices[rim], _LARGEST_RIM_STEP * resolution_m)
+            vertices[rim] = _move_sideways(field, vertices[rim], _LARGEST_RIM_STEP * resolution_m)
             normals[flat], sigma[flat] = [0.0, 0.0, side], LEVEL_SIGMA_m
     return SurfaceMesh(vertices, faces, sigma, normals, solid.is_closed)
 
@@ -148,27 +147,27 @@ def _level(vertices: Array, rough: Array, flat: Mask, level_m: float, side: floa
     return levelled
 
 
-def _move_sideways(gpis: Gpis, points_m: Array, reach_m: float) -> Array:
+def _move_sideways(field: SurfaceField, points_m: Array, reach_m: float) -> Array:
     """Move points horizontally onto the zero level, so that a flat end meets the walls in a sharp rim.
 
     A point that would move farther than ``reach_m``, because the field has no wall there, stays.
     """
     moved = points_m.copy()
     for _ in range(_RIM_STEPS):
-        found = gpis.predict(moved, gradient=True)
+        found = field.predict(moved, gradient=True)
         level = found.gradient[:, :2]
         moved[:, :2] -= (found.mean_m / np.maximum(np.sum(level**2, axis=1), _FLATTEST_WALL**2))[:, None] * level
     near = np.linalg.norm(moved - points_m, axis=1) < reach_m
     return np.where(near[:, None], moved, points_m)
 
 
-def _solid(gpis: Gpis, resolution_m: float, largest_margin_m: float) -> _Solid:
+def _solid(field: SurfaceField, resolution_m: float, largest_margin_m: float) -> _Solid:
     """Tabulate the field around the contacts, and farther on sides where the object continues."""
-    contacts = gpis.contacts_m
+    contacts = field.contacts_m
     margins = np.full((2, contacts.shape[1]), min(FIRST_MARGIN_m, largest_margin_m))
     while True:
         lower, upper = contacts.min(axis=0) - margins[0], contacts.max(axis=0) + margins[1]
-        grid = FieldGrid.tabulate(gpis, lower, upper, resolution_m)
+        grid = FieldGrid.tabulate(field, lower, upper, resolution_m)
         body = _body(grid, contacts)
         open_sides = _touched_sides(body)
         growing = open_sides & (margins < largest_margin_m)
@@ -201,20 +200,20 @@ def _pad(grid: FieldGrid, body: Mask, *, is_closed: bool) -> _Solid:
     return _Solid(grid.lower_m - grid.spacing_m, values, is_closed)
 
 
-def _refine(gpis: Gpis, points_m: Array, reach_m: float) -> tuple[Array, Array, Array]:
+def _refine(field: SurfaceField, points_m: Array, reach_m: float) -> tuple[Array, Array, Array]:
     """Move points onto the zero level by Newton steps; returns them with outward normals and standard deviations.
 
     A point that would move farther than ``reach_m`` stays: it lies on a cut or on a filled cavity.
     """
     for _ in range(_NEWTON_STEPS):
-        found = gpis.predict(points_m, gradient=True)
+        found = field.predict(points_m, gradient=True)
         slope = _slope(found.gradient)
         steps = (found.mean_m / slope**2)[:, None] * found.gradient
         is_near = np.linalg.norm(steps, axis=1) < reach_m
         points_m = points_m - np.where(is_near[:, None], steps, 0.0)
-    found = gpis.predict(points_m, gradient=True, variance=True)
+    found = field.predict(points_m, gradient=True, variance=True)
     slope = _slope(found.gradient)
-    sigma = gpis.sigma_inflation * np.sqrt(found.variance_m2) / slope
+    sigma = field.sigma_inflation * np.sqrt(found.variance_m2) / slope
     return points_m, found.gradient / slope[:, None], sigma
 
 

@@ -72,6 +72,40 @@ def test_simulated_grasps_all_around_know_the_whole_outline() -> None:
     assert known_part(shape, contacts).share > 0.95
 
 
+def faceted(mesh: trimesh.Trimesh) -> SurfaceMesh:
+    """Each face with vertices and normals of its own."""
+    normals, count = np.repeat(np.asarray(mesh.face_normals), 3, axis=0), 3 * len(mesh.faces)
+    corners = np.asarray(mesh.triangles).reshape(-1, 3)
+    return SurfaceMesh(corners, np.arange(count).reshape(-1, 3), np.full(count, 0.001), normals, is_closed=True)
+
+
+def test_a_surface_that_goes_on_by_symmetry_is_known_only_near_contacts() -> None:
+    tin = faceted(trimesh.creation.cylinder(0.04, 0.10, sections=64).subdivide_to_size(0.01))
+    angles = np.radians([0.0, 120.0, 240.0])
+    around = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)])
+    contacts = ContactSet(0.04 * around, around, np.full(3, 0.001), np.full(3, 0.087))
+    three = known_part(tin, contacts, floor_m=-0.05).share
+    every = np.radians(np.arange(0.0, 360.0, 45.0))
+    ring = np.column_stack([np.cos(every), np.sin(every), np.zeros(8)])
+    low_and_high = np.concatenate([0.04 * ring + [0, 0, height] for height in (-0.025, 0.025)])
+    all_around = ContactSet(low_and_high, np.tile(ring, (2, 1)), np.full(16, 0.001), np.full(16, 0.087))
+    assert three < 0.4
+    assert known_part(tin, all_around, floor_m=-0.05).share > three + 0.3
+
+
+def test_what_a_finger_went_through_is_not_known() -> None:
+    box = faceted(trimesh.creation.box((0.06, 0.06, 0.06)).subdivide_to_size(0.005))
+    normals = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+    contacts = ContactSet(0.03 * normals, normals, np.full(6, 0.001), np.full(6, 0.087))
+    inside, outside = np.array([[0.022, 0.0, 0.0]]), np.array([[0.045, 0.0, 0.0], [0.029, 0.0, 0.0]])
+    whole = known_part(box, contacts)
+    assert known_part(box, contacts, free_m=outside).share == whole.share
+    part = known_part(box, contacts, free_m=inside)
+    away = np.linalg.norm(box.vertices - [0.03, 0.0, 0.0], axis=1)
+    assert not part.known[away < 0.008].any()
+    assert (part.known == whole.known)[away > 0.012].all()
+
+
 def test_a_standing_box_is_known_below_from_the_table_and_not_above() -> None:
     box = trimesh.creation.box((0.06, 0.06, 0.06)).subdivide_to_size(0.01)
     normals = np.asarray(box.face_normals)
@@ -82,7 +116,10 @@ def test_a_standing_box_is_known_below_from_the_table_and_not_above() -> None:
         np.repeat(normals, 3, axis=0),
         is_closed=True,
     )
-    sides = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
-    contacts = ContactSet(0.03 * sides, sides, np.full(4, 0.001), np.full(4, 0.087))
+    sides = np.repeat([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], 4, axis=0)
+    spread = np.tile([[0.015, 0.015], [0.015, -0.015], [-0.015, 0.015], [-0.015, -0.015]], (4, 1))
+    along = np.column_stack([-sides[:, 1], sides[:, 0], np.zeros(16)])
+    points = 0.03 * sides + spread[:, :1] * along + spread[:, 1:] * [0, 0, 1]
+    contacts = ContactSet(points, sides, np.full(16, 0.001), np.full(16, 0.087))
     assert known_part(mesh, contacts, floor_m=-0.03).share == pytest.approx(5 / 6, abs=0.05)
     assert known_part(mesh, contacts).share == pytest.approx(4 / 6, abs=0.05)
