@@ -17,7 +17,8 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from drivers.core.contacts import Array
-from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, mesh_arrays
+from tactile_lab.slam.shape.selection.unexplained import are_inside
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tactile_lab.slam.shape.surfaces.surface import Contour, LEVEL_SIGMA_m, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 
@@ -157,10 +158,7 @@ def _contradicted(mesh: SurfaceMesh, free_m: Array | None) -> Mask:
     """Vertices near places that a finger went through, and that are inside all the same."""
     if free_m is None or not len(free_m):
         return np.zeros(len(mesh.vertices), dtype=bool)
-    import igl  # here, so that importing this module stays quick
-
-    inside = np.asarray(igl.fast_winding_number(*mesh_arrays(mesh), np.ascontiguousarray(free_m))) > 0.5
-    deep_m = free_m[inside]
+    deep_m = free_m[are_inside(free_m, mesh)]
     deep_m = deep_m[distances_to_mesh(deep_m, mesh) > _DEEP_m] if len(deep_m) else deep_m
     if not len(deep_m):
         return np.zeros(len(mesh.vertices), dtype=bool)

@@ -8,7 +8,6 @@ this is repeated. Kernel and evidence stay as they are.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
-from tactile_lab.slam.shape.fields.field_grid import FieldGrid, SurfaceField
+from tactile_lab.slam.shape.fields.field_grid import FieldGrid
 from tactile_lab.slam.shape.fields.gpis import Gpis
 
 _DEPTH_m = 0.002
@@ -44,24 +43,22 @@ def outside_at(gpis: Gpis, free_m: Array) -> Gpis:
     return field
 
 
-def in_one_piece(gpis: Gpis, resolution_m: float, whole: Callable[[Gpis], SurfaceField] = lambda gpis: gpis) -> Gpis:
-    """The field with its pieces joined where they are nearest, found on a grid; normals are observed.
-
-    Args:
-        gpis: the field that is told.
-        resolution_m: of the grid.
-        whole: makes the object of which it is a part; the field alone is the object by default.
-    """
+def in_one_piece(gpis: Gpis, resolution_m: float) -> Gpis:
+    """The field with its pieces joined where they are nearest, found on a grid; normals are observed."""
     for _ in range(_MOST_JOINTS):
-        field = whole(gpis)
-        contacts_m = field.contacts_m
+        contacts_m = gpis.contacts_m
         corners_m = contacts_m.min(axis=0) - _MARGIN_m, contacts_m.max(axis=0) + _MARGIN_m
-        grid = FieldGrid.tabulate(field, *corners_m, resolution_m)
+        grid = FieldGrid.tabulate(gpis, *corners_m, resolution_m)
         place_m = _narrowest_gap(grid, contacts_m)
         if place_m is None:
             break
-        gpis = _tell(gpis, place_m[None], -_DEPTH_m)
+        gpis = inside_at(gpis, place_m[None])
     return gpis
+
+
+def inside_at(gpis: Gpis, places_m: Array) -> Gpis:
+    """The field with places, shape (q, d), inside the object; normals are observed."""
+    return _tell(gpis, places_m, -_DEPTH_m)
 
 
 def _tell(gpis: Gpis, places_m: Array, value_m: float) -> Gpis:

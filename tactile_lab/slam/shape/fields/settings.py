@@ -20,7 +20,7 @@ ShapePart: TypeAlias = Literal[
     "polyhedron",
     "prism",
     "turned",
-    "turned with a part",
+    "parts",
     "standing field",
     "sections",
     "strays",

@@ -17,12 +17,14 @@ from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.held_out import foretells_better
+from tactile_lab.slam.shape.selection.unexplained import are_inside, unexplained
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.shape.solids.turned import Turned
-from tactile_lab.slam.shape.solids.turned_with_part import TurnedWithPart
-from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, mesh_arrays
+from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
+from tactile_lab.slam.shape.solids.with_parts import ONE_PART_m, WithParts
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 _COARSE_m = 0.006
@@ -31,6 +33,8 @@ _ON_SURFACE_m = 0.006
 _NOISE_SIGMAS = 2.0
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
 _LARGEST_SHARE_OFF_TURNED, _LARGEST_SHARE_OFF_WITH_PART = 0.01, 0.05
+_OUTSIDE_m = 0.012
+"""Contacts so far outside of a surface, several of them near each other, are no noise."""
 _KERNEL_STEPS = 10
 _LEFT_OUT_nats = 12.0
 """Cost of a contact that is centimetres off the surface: that of one outlier among twenty good contacts."""
@@ -84,7 +88,8 @@ def best_spatial_shape(
         return best
     if not _beyond_doubt(most, gpis) and without.isdisjoint({"field", "standing field", "sections"}):
         best, most = _likelier(_sectioned(gpis, floor_m), best, most)
-    return _revolving(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+    best = _revolving(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+    return _with_missing_parts(best, everything, free_points_m, floor_m)
 
 
 def _revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:
@@ -95,10 +100,37 @@ def _revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_le
     if "turned" in without:
         return None
     body = _turned(gpis, free_points_m, floor_m, at_least=at_least)
-    if "turned with a part" in without:
+    if "parts" in without:
         return body
     most = at_least if body is None else body.log_evidence
     return _turned_with_part(gpis, free_points_m, floor_m, at_least=most) or body
+
+
+def _with_missing_parts(
+    shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float | None
+) -> FittedShape:
+    """A shape with parts where contacts near each other lie outside: they were strays, or few among many on a solid.
+
+    Strays are left out one by one, at a price that is right for errors that have nothing to do with each other.
+    """
+    if not gpis.settings.without.isdisjoint({"strays", "parts"}):
+        return shape
+    mesh = _try_mesh(shape, floor_m)
+    if mesh is None:
+        return shape
+    groups = unexplained(gpis.contacts_m, mesh, far_m=_OUTSIDE_m, together_m=ONE_PART_m)
+    members = [group.members for group in groups if not group.is_inside and len(group.members) > 1]
+    if not members:
+        return shape
+    beside = np.isin(np.arange(len(gpis.contacts_m)), np.concatenate(members))
+    return _try_make(lambda: WithParts.of(shape, gpis, beside, floor_m, free_points_m)) or shape
+
+
+def _try_mesh(shape: FittedShape, floor_m: float | None) -> SurfaceMesh | None:
+    try:
+        return shape.mesh(_COARSE_m, floor_m)
+    except ShapeError:  # it encloses nothing, which is told where its surface is wanted
+        return None
 
 
 def _sectioned(gpis: Gpis, floor_m: float) -> FittedShape | None:
@@ -136,7 +168,7 @@ def _turned_with_part(
     gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float
 ) -> FittedShape | None:
     """The solid of revolution with a part beside it, if it has more evidence, as :func:`_turned`."""
-    shape = _try_make(lambda: TurnedWithPart.fit(gpis, floor_m, free_points_m))
+    shape = _try_make(lambda: turned_with_parts(gpis, floor_m, free_points_m))
     if shape is None:
         return None
     off = _LARGEST_SHARE_OFF_WITH_PART
@@ -234,9 +266,7 @@ def _filled_share(mesh: SurfaceMesh, free_points_m: Array) -> float:
     """Share of free places that lie inside a mesh by more than the contacts' noise."""
     if len(free_points_m) == 0:
         return 0.0
-    import igl  # here, so that importing this module stays quick
-
-    inside = np.asarray(igl.fast_winding_number(*mesh_arrays(mesh), np.ascontiguousarray(free_points_m))) > 0.5
+    inside = are_inside(free_points_m, mesh)
     if not inside.any():
         return 0.0
     deep = distances_to_mesh(free_points_m[inside], mesh) > _FREE_SIGMA_m

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
@@ -17,12 +18,12 @@ class SolidField:
 
     Args:
         mesh: watertight, its triangles counter-clockwise seen from outside.
-        sigma_m: standard deviation of the surface along its normal, the same everywhere.
+        sigma_m: standard deviation of the surface along its normal, the same everywhere or of each vertex, shape (n,).
     """
 
-    def __init__(self, mesh: TriangleMesh, sigma_m: float) -> None:
+    def __init__(self, mesh: TriangleMesh, sigma_m: float | Array) -> None:
         self._vertices, self._faces = mesh_arrays(mesh)
-        self._sigma_m = sigma_m
+        self._sigma_m = np.asarray(sigma_m)
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """Distances at points of shape (q, 3); gradients are the normals at the nearest points of the surface."""
@@ -35,7 +36,9 @@ class SolidField:
 
     def variance(self, points_m: Array, *, rough: bool = False) -> Array:
         """The surface's variance at points of shape (q, 3), shape (q,); ``rough`` has no effect."""
-        return np.full(len(points_m), self._sigma_m**2)
+        if self._sigma_m.ndim == 0:
+            return np.full(len(points_m), float(self._sigma_m) ** 2)
+        return np.asarray(self._sigma_m[cKDTree(self._vertices).query(points_m)[1]] ** 2)
 
 
 class TabulatedSolid:

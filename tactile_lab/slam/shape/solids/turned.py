@@ -95,31 +95,19 @@ class Turned:
         section = _both_halves(self.half, self.floor_m)
         return in_one_piece(outside_at(section, np.vstack([self.free_m, self.free_m * [-1, 1]])), _SECTION_GRID_m)
 
-    @cached_property
-    def contacts_m(self) -> Array:
-        """Contacts at their distances and heights, those farthest out on all sides of the axis, shape (n, 3)."""
-        reach_m, heights_m = self.half.contacts_m[np.argsort(-self.half.contacts_m[:, 0])].T
-        quarters = np.arange(len(reach_m)) * np.pi / 2
-        level = reach_m[:, None] * np.column_stack([np.cos(quarters), np.sin(quarters)])
-        return np.column_stack([level + self.axis_m, heights_m])
-
     def half_of(self, contacts: WeightedContacts, chosen: NDArray[np.bool_]) -> Gpis:
         """The field of the profile of some contacts in space, about this axis and with this kernel."""
         some = WeightedContacts(*(each[chosen] for each in vars(contacts).values()))
         half = _half(self.half.settings, some, self.axis_m)
         return half.with_log_parameters(self.half.kernel.log_parameters)
 
-    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
-        """The field of the profile at points of shape (q, 3); its variance is that of the surface."""
-        found = self.profile.predict(to_profile(points_m, self.axis_m), gradient=gradient, variance=variance)
-        slope, spread = np.empty((0, 3)), found.variance_m2
-        if gradient:
-            arms_m = points_m[:, :2] - self.axis_m
-            out = arms_m / np.maximum(np.linalg.norm(arms_m, axis=1, keepdims=True), 1e-9)
-            slope = np.column_stack([found.gradient[:, :1] * out, found.gradient[:, 1]])
-        if variance:
-            spread = self.profile.sigma_inflation**2 * spread + self.axis_sigma_m**2
-        return Prediction(found.mean_m, slope, spread)
+    def predict(self, points_m: Array) -> Prediction:
+        """The field of the profile, with its gradient, at points of shape (q, 3)."""
+        found = self.profile.predict(to_profile(points_m, self.axis_m), gradient=True)
+        arms_m = points_m[:, :2] - self.axis_m
+        out = arms_m / np.maximum(np.linalg.norm(arms_m, axis=1, keepdims=True), 1e-9)
+        slope = np.column_stack([found.gradient[:, :1] * out, found.gradient[:, 1]])
+        return Prediction(found.mean_m, slope, found.variance_m2)
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
         """Raises ShapeError: a solid has no outline."""

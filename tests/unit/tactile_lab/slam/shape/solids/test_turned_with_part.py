@@ -11,7 +11,8 @@ from drivers.core.errors import ShapeError
 from tactile_lab.experiments.data.household import HOUSEHOLD, turned
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
-from tactile_lab.slam.shape.solids.turned_with_part import TurnedWithPart
+from tactile_lab.slam.shape.solids.turned import Turned
+from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
 from tests.support.solid_examples import box_mesh, contacts_on, field_on
@@ -44,7 +45,8 @@ def felt(seed: int, count: int = 110) -> tuple[Gpis, Array]:
 
 def test_the_part_is_told_from_the_body_and_both_are_one_closed_surface() -> None:
     field, on_bar = felt(seed=3)
-    shape = TurnedWithPart.fit(field, 0.0)
+    shape = turned_with_parts(field, 0.0)
+    assert isinstance(shape.body, Turned)
     assert np.abs(shape.body.axis_m - AXIS_m[:2]).max() < 0.002
     found_m = np.vstack([part.contacts_m for part in shape.parts])
     assert distances_among(field.contacts_m[on_bar], found_m).max() < 1e-9
@@ -64,7 +66,7 @@ def distances_among(wanted_m: Array, found_m: Array) -> Array:
 def test_it_is_chosen_by_evidence_unless_it_is_left_out() -> None:
     field = field_on(HOUSEHOLD["cup-with-handle"](), 110, seed=4)
     assert best_shape(field, floor_m=0.0).name == "turned with a part"
-    settings = field.settings.model_copy(update={"without": frozenset({"turned with a part"})})
+    settings = field.settings.model_copy(update={"without": frozenset({"parts"})})
     seen = field.observations
     same = Gpis.fit(field.contacts_m, field.normals, seen.value_sigma_m, seen.gradient_sigma, settings)
     assert best_shape(same.with_log_parameters(field.kernel.log_parameters), floor_m=0.0).name != "turned with a part"
@@ -72,6 +74,6 @@ def test_it_is_chosen_by_evidence_unless_it_is_left_out() -> None:
 
 def test_nothing_lies_beside_a_cup_and_a_box_has_no_body() -> None:
     with pytest.raises(ShapeError, match="lie beside a solid of revolution"):
-        TurnedWithPart.fit(field_on(HOUSEHOLD["cup"](), 100, seed=3), 0.0)
+        turned_with_parts(field_on(HOUSEHOLD["cup"](), 100, seed=3), 0.0)
     with pytest.raises(ShapeError):
-        TurnedWithPart.fit(field_on(box_mesh(), 100, seed=3), 0.0)
+        turned_with_parts(field_on(box_mesh(), 100, seed=3), 0.0)
