@@ -31,7 +31,7 @@ def jug() -> trimesh.Trimesh:
     return both
 
 
-def felt(seed: int, count: int = 110) -> tuple[Gpis, Array]:
+def felt(seed: int, count: int = 80) -> tuple[Gpis, Array]:
     """Contacts on it, but for those where one part is inside the other; and which of them are on the bar."""
     points_m, normals = contacts_on(jug(), count, seed)
     places_m = points_m - AXIS_m
@@ -63,6 +63,7 @@ def distances_among(wanted_m: Array, found_m: Array) -> Array:
     return np.asarray(np.linalg.norm(wanted_m[:, None] - found_m, axis=-1).min(axis=1))
 
 
+@pytest.mark.long
 def test_it_is_chosen_by_evidence_unless_it_is_left_out() -> None:
     field = field_on(HOUSEHOLD["cup-with-handle"](), 110, seed=4)
     assert best_shape(field, floor_m=0.0).name == "turned with a part"
