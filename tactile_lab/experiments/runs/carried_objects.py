@@ -193,10 +193,7 @@ def figures(carries: Sequence[WatchedCarry]) -> dict[str, Any]:
         found |= _errors(f"{name}_carry", np.array([_error(each, how, each.after) for each in carries]).reshape(-1, 3))
         off = np.array([_error(each, how, each.later) for each in steps]).reshape(-1, 3)
         found |= _errors(f"{name}_step", off)
-        sigmas = np.array(
-            [[*[each.by[how].sigma.translation_m] * 2, each.by[how].sigma.rotation_rad] for each in steps]
-        )
-        shares = np.abs(off) / np.maximum(sigmas.reshape(-1, 3), 1e-9)
+        shares = off / np.array([_sigmas(each.by[how]) for each in steps]).reshape(-1, 3)
         found |= {f"{name}_z_mm": shares[:, :2].ravel().tolist(), f"{name}_z_deg": shares[:, 2].tolist()}
     return found
 

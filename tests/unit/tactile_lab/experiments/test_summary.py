@@ -127,3 +127,11 @@ def test_runs_of_a_kind_stand_together() -> None:
         (k, m) for k in ("mugs", "curved") for m in ("known-pose", "joint")
     ]
     assert single.head[:3] == ("shape", "method", "runs")
+
+
+def test_pooled_numbers_have_a_root_mean_square_and_shares_within_one_two_and_three() -> None:
+    rows = [Row(row("joint", seed, 1.0).cell, {"off": off}) for seed, off in ((0, [0.5, -1.5]), (1, [2.5, 4.0]))]
+    columns = [Column("rms", "off", 2, kind="rms"), Column("within", "off", 0, kind="within")]
+    assert table(group_runs(rows), columns, {})[1][-4:-2] == ["2.49", "25 / 50 / 75"]
+    empty = [Row(rows[0].cell, {"off": []})]
+    assert table(group_runs(empty), columns, {})[1][-4:-2] == ["–", "–"]
