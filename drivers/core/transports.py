@@ -53,6 +53,20 @@ def link_health(transport: Transport) -> tuple[str, ...]:
     return transport.health() if isinstance(transport, WatchedTransport) else ()
 
 
+@runtime_checkable
+class NamedTransport(Protocol):
+    """A transport that knows, once it is open, which device is at its far end."""
+
+    @property
+    def identity(self) -> str:
+        """Of the device, as text for people; empty if unknown."""
+
+
+def link_identity(transport: Transport) -> str:
+    """Which device a transport of any kind has found."""
+    return transport.identity if isinstance(transport, NamedTransport) else ""
+
+
 class Peer(Protocol):
     """The far end of an in-memory transport: a source and sink of device bytes."""
 
@@ -149,3 +163,8 @@ class TappedTransport:
     def health(self) -> tuple[str, ...]:
         """Problems of the tapped transport."""
         return link_health(self._transport)
+
+    @property
+    def identity(self) -> str:
+        """Of the device at the tapped transport's far end."""
+        return link_identity(self._transport)

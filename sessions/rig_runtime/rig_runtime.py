@@ -25,6 +25,7 @@ from sessions.perception.instruments import (
     CyclingInstrument,
     FrameReading,
     HandInstrument,
+    NamedInstrument,
     PolledInstrument,
     WatchingCamera,
     motor_torques,
@@ -130,6 +131,8 @@ class RigRuntime:
             self._await_first_samples()
             if isinstance(self.hand, CyclingInstrument):
                 self.log(Level.INFO, "hand", self.hand.description())
+            if isinstance(self.base, NamedInstrument) and self.base.identity:
+                self.log(Level.INFO, "base", self.base.identity)
         except BaseException as error:
             for problem in self._close_all():
                 error.add_note(f"while closing again: {problem}")

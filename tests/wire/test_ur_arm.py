@@ -170,6 +170,8 @@ def test_where_the_arm_stands_is_read_with_the_tool_that_was_set(
     monkeypatch.setattr(RtdeClient, "data", tell_late)
     served.device.connect()
     np.testing.assert_allclose(served.device.exchange().q, HERE, atol=1e-6)
+    assert "UR10" in served.device.identity
+    assert "4.6 kg" in served.device.identity
 
 
 def test_an_arm_whose_software_is_not_known_is_refused_before_it_is_taken_over(served: Served) -> None:

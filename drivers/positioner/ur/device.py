@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivers.core.clock import Clock
-from drivers.core.transports import Datagram, Transport
+from drivers.core.transports import Datagram, Transport, link_identity
 from drivers.positioner.codec import PositionerCodec, PositionerCommand
 from drivers.positioner.positioner import Positioner
 from drivers.positioner.settings import PositionerSample
@@ -45,6 +45,11 @@ class UrPositioner(Positioner):
     def arm(self) -> ArmState | None:
         """What the arm said of itself last; None before it said anything."""
         return self._arm
+
+    @property
+    def identity(self) -> str:
+        """Model, version and payload, read when it was connected."""
+        return link_identity(self._transport)
 
     def connect(self) -> None:
         """As :meth:`Positioner.connect`."""

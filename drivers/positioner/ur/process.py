@@ -28,12 +28,12 @@ class UrProcess:
     def __init__(self, wiring: UrWiring, settings: UrSettings, name: str) -> None:
         self.name, self._wiring, self._settings = name, wiring, settings
         self._child = RecordProcess("drivers.positioner.ur.worker", name)
-        self._found = ""
+        self._identity = ""
 
     @property
-    def found(self) -> str:
+    def identity(self) -> str:
         """Model, version and payload of the arm, read when it was connected."""
-        return self._found
+        return self._identity
 
     def open(self) -> None:
         """Start the process and wait until it has the arm; all or nothing, repeatable.
@@ -48,7 +48,7 @@ class UrProcess:
         start = {"name": self.name, "host": self._wiring.host, "settings": self._settings.model_dump(mode="json")}
         self._child.start(start)
         try:
-            self._found = self._child.await_record(RecordKind.READY, _START_s, self._raise_error)["found"]
+            self._identity = self._child.await_record(RecordKind.READY, _START_s, self._raise_error)["identity"]
         except BaseException:
             self.close()
             raise

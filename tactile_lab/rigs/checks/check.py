@@ -176,7 +176,9 @@ def _base(runtime: RigRuntime, watch: StreamWatch, share: float) -> Finding:
     place = ", ".join(f"{value:.3f}" for value in runtime.perception.base_q[:3])
     figures = watch.figures(BASE_LINK)
     problems, remarks = told_losses(_problems(runtime.base), share)
-    return _finding("base", problems, [f"at {place} m", in_words(figures), *remarks], figures)
+    identity = runtime.base.identity if isinstance(runtime.base, NamedInstrument) else ""
+    words = [identity] if identity else []
+    return _finding("base", problems, [*words, f"at {place} m", in_words(figures), *remarks], figures)
 
 
 def _fingertip(finger: str, runtime: RigRuntime, watch: StreamWatch, names: TactileNames, rig: Rig) -> Finding:
