@@ -14,7 +14,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
-from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
 
 

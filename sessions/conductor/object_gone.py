@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from drivers.core.contacts import Array, Grasp
-from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.probing.bounding_box import BoundingBox
 
 OPENING_m = 0.105
 """Between parallel sides that thumb and fingers still straddle."""

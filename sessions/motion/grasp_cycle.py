@@ -18,8 +18,8 @@ from sessions.motion.grasp_plan import GraspPlan, evade
 from sessions.motion.guard import Guard
 from sessions.motion.holding import HoldingForces
 from sessions.motion.motion import Motion
-from sessions.motion.side_survey import LOW_m
-from sessions.motion.touching import SideTouch, Toucher
+from sessions.motion.probing.side_survey import LOW_m
+from sessions.motion.probing.touching import SideTouch, Toucher
 from sessions.motion.travel import travel_height_m
 from sessions.motion.weighing import Grip, LiftEnd, Weigher
 from sessions.perception.carrying.forecast import Forecast, IntendedCarry

@@ -7,7 +7,7 @@ from itertools import product
 from drivers.core.clock import Clock, VirtualClock
 from drivers.shadow.closing.closing import SIDEWAYS, closing
 from drivers.shadow.closing.posture import HandShape
-from sessions.motion.touch_patterns import ROW, TAP, TAP_HEIGHT_m
+from sessions.motion.probing.touch_patterns import ROW, TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.settings import SessionSettings
 
 

@@ -26,7 +26,7 @@ from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.safety import SafetySettings
-from sessions.motion.touch_patterns import TAP, TAP_HEIGHT_m
+from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.collision_check import links_are_clear, standing
 from tactile_lab.autonomy.heuristic_planner import PlanSettings
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, closing_rays

@@ -12,7 +12,7 @@ from drivers.core.poses import planar
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.estimator import Reorientation
-from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan

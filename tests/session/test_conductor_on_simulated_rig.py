@@ -19,7 +19,7 @@ from sessions.conductor.conductor import Conductor
 from sessions.conductor.policy_decisions import Approve, approve_everything
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
-from sessions.motion.box_prober import ProbingSettings
+from sessions.motion.probing.box_prober import ProbingSettings
 from sessions.motion.safety import SafetySettings
 from sessions.recording.recorder import Recorder
 from sessions.recording.session_events import EventKind, SessionEvent

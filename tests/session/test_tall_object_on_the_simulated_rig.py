@@ -14,7 +14,7 @@ from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
-from sessions.motion.box_prober import ProbingSettings
+from sessions.motion.probing.box_prober import ProbingSettings
 from sessions.recording.recorder import Recorder
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings

@@ -9,8 +9,8 @@ import numpy as np
 from gtsam import Pose2
 
 from drivers.core.contacts import Array, Grasp
-from sessions.motion.bounding_box import BoundingBox
-from sessions.motion.box_fit import fit_box, on_sides
+from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.motion.probing.box_fit import fit_box, on_sides
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
 
 _LEAST_FOR_BOX = 4

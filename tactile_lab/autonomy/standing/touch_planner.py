@@ -18,8 +18,8 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.side_survey import LOW_m
-from sessions.motion.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m
+from sessions.motion.probing.side_survey import LOW_m
+from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.side_clearance import StandingBox

@@ -23,7 +23,7 @@ from sessions.conductor.estimator import Reorientation
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, evade, holds
-from sessions.motion.touch_patterns import TAP, TAP_HEIGHT_m
+from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.hand_candidates import grasp_time_s, table_of
 from tactile_lab.experiments.data.sensing import line_to_contact, measured_contact, planar_pose
 from tactile_lab.experiments.data.solids import Solid

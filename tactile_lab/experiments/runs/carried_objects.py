@@ -18,7 +18,7 @@ from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import SessionOutcome
-from sessions.motion.box_prober import ProbingSettings
+from sessions.motion.probing.box_prober import ProbingSettings
 from sessions.perception.carrying.carry import Carry
 from sessions.perception.interpreter import HAND_LINK
 from sessions.recording.recorder import NullRecorder

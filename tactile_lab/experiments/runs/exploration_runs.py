@@ -14,7 +14,7 @@ from tactile_lab.experiments.coverage_criteria import GOAL, Definition, Explored
 from tactile_lab.experiments.data.explored_objects import ExploredObject, FixedObject, MovingObject
 from tactile_lab.experiments.data.outlines import OUTLINES_m
 from tactile_lab.experiments.data.planar_hand import PlanarHand, planned_rays
-from tactile_lab.experiments.runs.oracle import fewest_grasps
+from tactile_lab.experiments.runs.limits.oracle import fewest_grasps
 from tactile_lab.slam.exploration.information_policy import InformationPolicy
 from tactile_lab.slam.exploration.policies import make_policy
 from tactile_lab.slam.exploration.policy import Decision, Policy, Surface

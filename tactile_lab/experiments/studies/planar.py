@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from tactile_lab.experiments.cells import Setting, grid
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.runs import contact_limit, contour_limit, shape_runs, tracking_runs
+from tactile_lab.experiments.runs import shape_runs, tracking_runs
+from tactile_lab.experiments.runs.limits import contact_limit, contour_limit
 from tactile_lab.experiments.studies.columns import (
     AGAINST_KNOWN,
     MEAN_DISTANCE,

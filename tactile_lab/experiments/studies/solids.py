@@ -7,7 +7,8 @@ from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.household import HOUSEHOLD
 from tactile_lab.experiments.data.solids import FURTHER_SHAPES, MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.experiment import Experiment
-from tactile_lab.experiments.runs import contact_limit, known_shape, solid_limit, tracking_runs
+from tactile_lab.experiments.runs import tracking_runs
+from tactile_lab.experiments.runs.limits import contact_limit, known_shape, solid_limit
 from tactile_lab.experiments.studies import everyday_shape
 from tactile_lab.experiments.studies.columns import (
     AGAINST_KNOWN,

@@ -7,7 +7,7 @@ from gtsam import Pose2
 
 from drivers.core.contacts import Contact, Grasp
 from sessions.conductor.object_gone import blocked, lost, not_found
-from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.probing.bounding_box import BoundingBox
 
 
 def grasp(index: int, *places_m: tuple[float, float, float]) -> Grasp:

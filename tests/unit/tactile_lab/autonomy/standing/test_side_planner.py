@@ -10,7 +10,7 @@ from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
-from sessions.motion.bounding_box import BoundingBox
+from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings

@@ -23,7 +23,7 @@ from tactile_lab.experiments.runs.exploration_runs import (
     moving_settings,
     palms_called,
 )
-from tactile_lab.experiments.runs.oracle import fewest_grasps
+from tactile_lab.experiments.runs.limits.oracle import fewest_grasps
 from tactile_lab.experiments.summary import Column, Group, correlation, table
 from tactile_lab.slam.exploration.ten_candidates import TEN_PALMS
 from tests.support.rectangle_world import contacts_every

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.experiments.cells import Cell
-from tactile_lab.experiments.runs.solid_limit import limit_of_solid
+from tactile_lab.experiments.runs.limits.solid_limit import limit_of_solid
 
 pytestmark = pytest.mark.long  # means over seeds
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.experiments.cells import Cell
-from tactile_lab.experiments.runs.contour_limit import limit_of_contour
+from tactile_lab.experiments.runs.limits.contour_limit import limit_of_contour
 
 pytestmark = pytest.mark.long  # means over seeds
 

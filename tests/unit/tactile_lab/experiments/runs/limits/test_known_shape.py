@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tactile_lab.experiments.cells import Cell
-from tactile_lab.experiments.runs.known_shape import follow_known_shape
+from tactile_lab.experiments.runs.limits.known_shape import follow_known_shape
 
 
 @cache

@@ -20,7 +20,7 @@ from sessions.motion.cycle_settings import CycleSettings, TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.guard import Guard
 from sessions.motion.motion import Motion
-from sessions.motion.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m
+from sessions.motion.probing.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m
 from sessions.motion.travel import travel_height_m
 from sessions.perception.approach_paths import TipSurface
 

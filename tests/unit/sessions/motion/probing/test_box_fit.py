@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sessions.motion.box_fit import fit_box, on_sides
+from sessions.motion.probing.box_fit import fit_box, on_sides
 
 
 def contacts(turn_rad: float, half_m: tuple[float, float], rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

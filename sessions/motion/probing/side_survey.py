@@ -12,10 +12,10 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES
-from sessions.motion.bounding_box import BoundingBox
-from sessions.motion.box_fit import fit_box, on_sides
+from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.motion.probing.box_fit import fit_box, on_sides
 from sessions.motion.grasp_frame import GraspFrame
-from sessions.motion.touching import SideTouch, Toucher
+from sessions.motion.probing.touching import SideTouch, Toucher
 
 _ASSUMED_m = 0.030
 """From the middle to a side that was not found."""

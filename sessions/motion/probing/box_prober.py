@@ -19,10 +19,10 @@ from pydantic import Field
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
-from sessions.motion.bounding_box import SIDES, BoundingBox
+from sessions.motion.probing.bounding_box import SIDES, BoundingBox
 from sessions.motion.grasp_frame import GraspFrame
-from sessions.motion.side_survey import SideSurvey
-from sessions.motion.touching import Toucher
+from sessions.motion.probing.side_survey import SideSurvey
+from sessions.motion.probing.touching import Toucher
 
 _ASSUMED_m = 0.030
 """Distance from the middle to a side that was not found."""

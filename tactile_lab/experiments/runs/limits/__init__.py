@@ -1,0 +1,1 @@
+"""How well it can be done at best: bounds on tracking, shape and exploration."""
