@@ -16,8 +16,8 @@ from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import TactileLabError
 from sessions.conductor.estimator import EstimatorService, PlannedGrasp, PoseStep, Reorientation
 from sessions.conductor.estimator_client import EstimatorClient
-from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.safety import InterruptGuard, SafetySupervisor
 from sessions.motion.weighing import LiftEnd
 from sessions.perception.carrying.forecast import Forecast

@@ -14,8 +14,8 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
-from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.probing.bounding_box import BoundingBox
 
 
 @dataclass(frozen=True)

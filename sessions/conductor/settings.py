@@ -6,8 +6,8 @@ from pydantic import Field
 
 from drivers.core.configuration import StrictModel
 from sessions.conductor.guided_settings import GuidedSettings
-from sessions.motion.probing.box_prober import ProbingSettings
 from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.probing.box_prober import ProbingSettings
 from sessions.motion.safety import SafetySettings
 
 

@@ -7,12 +7,12 @@ import numpy as np
 from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.decisions import SessionRoles
 from sessions.conductor.policy_decisions import Approve, PolicyDecisions, approve_everything, record_choices
-from sessions.motion.probing.box_prober import BoxProber
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.motion import Motion
-from sessions.motion.safety import InterruptGuard, SafetySettings, SafetySupervisor
+from sessions.motion.probing.box_prober import BoxProber
 from sessions.motion.probing.touching import Toucher
+from sessions.motion.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.autonomy.closing_tables import solve_closings
 from tactile_lab.autonomy.estimator_process import client_for

@@ -25,8 +25,8 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.safety import SafetySettings
 from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
+from sessions.motion.safety import SafetySettings
 from tactile_lab.autonomy.collision_check import links_are_clear, standing
 from tactile_lab.autonomy.heuristic_planner import PlanSettings
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, closing_rays

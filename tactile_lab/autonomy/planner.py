@@ -12,10 +12,10 @@ from drivers.core.poses import planar
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.estimator import Reorientation
-from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.estimated_object import EstimatedObject
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser

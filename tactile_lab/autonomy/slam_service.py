@@ -17,8 +17,8 @@ from gtsam import Pose3
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
 from sessions.conductor.estimator import Estimate, PlannedGrasp, Reorientation
-from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.estimate_messages import surface_message, trust_message
 from tactile_lab.autonomy.freed_memory import return_freed_memory
 from tactile_lab.autonomy.planner import Planner

@@ -19,8 +19,8 @@ from pydantic import Field
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
-from sessions.motion.probing.bounding_box import SIDES, BoundingBox
 from sessions.motion.grasp_frame import GraspFrame
+from sessions.motion.probing.bounding_box import SIDES, BoundingBox
 from sessions.motion.probing.side_survey import SideSurvey
 from sessions.motion.probing.touching import Toucher
 

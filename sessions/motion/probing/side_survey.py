@@ -12,9 +12,9 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
-from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.probing.touching import SideTouch, Toucher
 
 _ASSUMED_m = 0.030

@@ -10,13 +10,13 @@ from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.session_outcome import Ending, SessionOutcome
-from sessions.motion.probing.bounding_box import SIDES, BoundingBox
-from sessions.motion.probing.box_prober import BoxProber, ProbingSettings
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.motion import Motion
-from sessions.motion.safety import SafetySettings, SafetySupervisor
+from sessions.motion.probing.bounding_box import SIDES, BoundingBox
+from sessions.motion.probing.box_prober import BoxProber, ProbingSettings
 from sessions.motion.probing.touching import Toucher
+from sessions.motion.safety import SafetySettings, SafetySupervisor
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner

@@ -15,9 +15,9 @@ from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import Motion
-from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
 from sessions.motion.probing.touching import Toucher
+from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.recording.session_events import EventKind
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet

@@ -10,9 +10,9 @@ from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
-from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.standing.candidate import SideReach

@@ -9,8 +9,8 @@ from gtsam import Pose2, Pose3
 from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
-from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.cycle_settings import TouchSettings
+from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
