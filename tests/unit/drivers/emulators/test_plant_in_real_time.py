@@ -59,6 +59,14 @@ class Ending(VirtualClock):
             os.close(self._input_end)
 
 
+@pytest.fixture(autouse=True)
+def own_scheduling() -> Iterator[None]:
+    """The plant asks for the real-time scheduler, which is the thread's own beyond the test."""
+    policy, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
+    yield
+    os.sched_setscheduler(0, policy, parameters)
+
+
 @pytest.fixture
 def input_end(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     """The far end of this program's standard input."""
