@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from gtsam import Pose3, Rot3
-from scipy.stats import chi2
 
 from drivers.core.contacts import Array
 from drivers.core.rotations import exponential, logarithm
 from tactile_lab.evaluation.consistency.levels import LEVELS
 from tactile_lab.evaluation.consistency.pose_covariance import pose_deviation
 from tactile_lab.evaluation.trajectory import Compared, Poses, compared_grasps
+from tactile_lab.slam.graph.chances import chi_squared_quantile
 
 _LEAST_VARIANCE = 1e-9
 """A component with a smaller variance is given, not estimated: the birth pose, or the height of what is on a table."""
@@ -68,7 +68,8 @@ def pose_consistency(
     if not judged:
         return None
     nees, sizes, densities = (np.array(column) for column in zip(*judged, strict=True))
-    inside = tuple(float(np.mean(nees <= chi2.ppf(level, sizes))) for level in LEVELS)
+    limits = ([chi_squared_quantile(level, int(size)) for size in sizes] for level in LEVELS)
+    inside = tuple(float(np.mean(nees <= np.array(most))) for most in limits)
     return PoseConsistency(tuple((nees / sizes).tolist()), int(sizes.max()), inside, float(densities.mean()))
 
 

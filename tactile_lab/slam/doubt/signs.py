@@ -7,13 +7,15 @@ it. A slip that the motion model hardly allows, a jump, or contacts that fit bef
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.stats import chi2, hypergeom
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.doubt.status import Doubt
+from tactile_lab.slam.graph.chances import chi_squared_exceeded_by, chi_squared_tail, hypergeometric_tail
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
@@ -75,7 +77,7 @@ def signs(contact_map: ContactMap, noise: MotionNoise, *, poses_given: bool = Fa
     return (*found, *(_other_object(contact_map) or _strays(contact_map)), *_first_grasp(contact_map))
 
 
-def _slips(contact_map: ContactMap, noise: MotionNoise) -> tuple[Array, Array]:
+def _slips(contact_map: ContactMap, noise: MotionNoise) -> tuple[Array, NDArray[np.bool_]]:
     """Slips of a trajectory in standard deviations, shape (k - 1, size), and whether each is bound to the hand."""
     cost = MotionCost.of(contact_map, noise)
     bound = np.array([how is Moved.AS_MEANT for how in contact_map.moved[1:]], dtype=bool)
@@ -88,7 +90,7 @@ def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     for part, kind in ((slice(None, split), "moved"), (slice(split, None), "turned")):
         vectors = slips[:, part]
         lengths = np.linalg.norm(vectors, axis=1)
-        least = float(np.sqrt(chi2.isf(_UNDONE, vectors.shape[1])))
+        least = math.sqrt(chi_squared_exceeded_by(_UNDONE, vectors.shape[1]))
         cosines = np.sum(vectors[1:] * vectors[:-1], axis=1) / np.maximum(lengths[1:] * lengths[:-1], 1e-12)
         opposite = (cosines < _UNDONE_COSINE) & (np.minimum(lengths[1:], lengths[:-1]) > least)
         for step in np.flatnonzero(opposite & bound[1:] & bound[:-1]):
@@ -100,7 +102,7 @@ def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
 
 def _unlikely(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     slips, bound = _slips(contact_map, noise)
-    probabilities = chi2.sf(np.sum(slips**2, axis=1), contact_map.space.size)
+    probabilities = chi_squared_tail(np.sum(slips**2, axis=1), contact_map.space.size)
     confirmed = np.array([len(grasp.kept) >= _CONFIRMING for grasp in contact_map.placed])
     doubtful = (probabilities < _INCREDIBLE) | ~(confirmed[1:] & confirmed[:-1])
     return [
@@ -127,7 +129,7 @@ def _large_together(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     if carried.sum() < _LEAST_CARRIED:
         return []
     squared = np.sum(slips[carried] ** 2, axis=1)
-    chance = chi2.sf(squared.sum() - squared.max(), (len(squared) - 1) * contact_map.space.size)
+    chance = float(chi_squared_tail(squared.sum() - squared.max(), (len(squared) - 1) * contact_map.space.size))
     if chance >= _TOGETHER:
         return []
     words = (
@@ -163,9 +165,9 @@ def _other_object(contact_map: ContactMap) -> list[Doubt]:
     count, found = len(wrong), []
     for split in range(_LEAST_GRASPS, count - _LEAST_GRASPS + 1):
         after = int(wrong[split:].sum())
-        chance = hypergeom.sf(after - 1, int(total.sum()), int(wrong.sum()), int(total[split:].sum()))
+        chance = hypergeometric_tail(after, int(total.sum()), int(wrong.sum()), int(total[split:].sum()))
         before = int(wrong[:split].sum())
-        chance = min(chance, hypergeom.sf(before - 1, int(total.sum()), int(wrong.sum()), int(total[:split].sum())))
+        chance = min(chance, hypergeometric_tail(before, int(total.sum()), int(wrong.sum()), int(total[:split].sum())))
         found.append((float(chance), split))
     chance, split = min(found, default=(1.0, 0))
     if chance > _OTHER_OBJECT:

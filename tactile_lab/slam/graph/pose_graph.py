@@ -21,7 +21,7 @@ from pydantic import Field
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.core.poses import planar
-from tactile_lab.slam.graph.chi_squared import chi_squared_quantile
+from tactile_lab.slam.graph.chances import chi_squared_quantile
 from tactile_lab.slam.graph.faces import Labels
 from tactile_lab.slam.graph.registration import Alignment, align
 from tactile_lab.slam.graph.relative_poses import RelativePose

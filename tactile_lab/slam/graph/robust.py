@@ -26,7 +26,7 @@ from pydantic import Field
 
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
-from tactile_lab.slam.graph.chi_squared import chi_squared_quantile
+from tactile_lab.slam.graph.chances import chi_squared_quantile
 from tactile_lab.slam.graph.heading_hypotheses import heading_hypotheses
 from tactile_lab.slam.graph.least_squares import covariance_of, gtsam_problem, solve, squared_distances
 from tactile_lab.slam.graph.relative_poses import RelativePose, chain, jacobians, residuals
