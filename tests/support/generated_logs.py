@@ -92,3 +92,53 @@ def logs(draw: st.DrawFn) -> dict[str, Any]:
     if outline is not None:
         document["object"] = {"polygon_m": outline}
     return document
+
+
+_ODD = (
+    None,
+    "",
+    "x",
+    True,
+    -1,
+    0,
+    1e-320,
+    1e308,
+    -1e308,
+    1e6,
+    float("nan"),
+    float("inf"),
+    10**400,
+    [],
+    {},
+    [[]],
+    "\x00",
+)
+
+
+@st.composite
+def damaged_logs(draw: st.DrawFn) -> dict[str, Any]:
+    """The same with up to four entries somewhere in them replaced, removed or repeated."""
+    document = draw(logs())
+    for _ in range(draw(st.integers(1, 4))):
+        inside: Any = document
+        while True:
+            places = list(inside) if isinstance(inside, dict) else list(range(len(inside)))
+            if not places:
+                break
+            place = draw(st.sampled_from(places))
+            if isinstance(inside[place], dict | list) and draw(st.integers(0, 4)):
+                inside = inside[place]
+                continue
+            _damage(draw, inside, place)
+            break
+    return document
+
+
+def _damage(draw: st.DrawFn, inside: Any, place: Any) -> None:
+    match draw(st.sampled_from(["replace", "replace", "remove", "repeat"])):
+        case "replace":
+            inside[place] = draw(st.sampled_from(_ODD))
+        case "remove":
+            del inside[place]
+        case "repeat" if isinstance(inside, list):
+            inside.insert(place, inside[place])
