@@ -24,7 +24,7 @@ def test_any_log_that_fits_the_form_ends_in_a_result_or_in_words(document, metho
     _reconstruct(document, method, gate)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(document=damaged_logs(), method=st.sampled_from(METHODS))
 def test_a_log_that_is_damaged_anywhere_ends_in_a_result_or_in_words(document, method):
     _reconstruct(document, method, "")
