@@ -80,6 +80,20 @@ def test_help_loads_nothing_heavy():
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
+def test_a_bad_log_is_told_before_the_estimation_is_loaded(tmp_path):
+    log = tmp_path / "log.json"
+    log.write_text("[" * 50_000)
+    code = (
+        "import sys; from tactile_lab.cli.main import main\n"
+        "try: main(sys.argv[1:])\n"
+        "finally: print([n for n in sys.modules if n.startswith(('tactile_lab.slam', 'tactile_lab.workflow'))])"
+    )
+    told = subprocess.run([sys.executable, "-c", code, "reconstruct", log], capture_output=True, text=True, timeout=60)
+    assert told.returncode == 2
+    assert "is not JSON (nested too deeply)" in told.stderr
+    assert told.stdout == "[]\n"
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [

@@ -61,6 +61,7 @@ def reconstruct(
 
     The ground truth in a log or session is used by the evaluation only, and by the method known-pose.
     """
+    _check_log(Path(source))
     from tactile_lab.cli.running.progress import LiveProgress
     from tactile_lab.cli.running.results import conclude
     from tactile_lab.workflow.reconstructing import Wishes, reconstruct
@@ -77,3 +78,17 @@ def reconstruct(
     with LiveProgress(f"reconstruction of {source}") as progress:
         finished = reconstruct(resolve_name(root, source), root, wishes, out, progress)
     conclude(finished, as_json)
+
+
+def _check_log(path: Path) -> None:
+    """Tell mistakes in a log of contacts before the estimation is loaded, which takes longer than to read it twice.
+
+    Raises:
+        ConfigurationError: the file is no such log, or cannot be read.
+    """
+    if path.suffix == ".json":
+        from drivers.core.reading.bounded_files import refuse_unreachable
+        from sessions.exchange.contact_log import read_contact_log
+
+        refuse_unreachable(path)
+        read_contact_log(path)
