@@ -27,9 +27,9 @@ from drivers.shadow.model.joint_calibration import JointCalibration
 from drivers.shadow.protocol.palm_codec import PalmStatus
 from tactile_lab import rigs
 from tests.support.driver_sweep import DriverSweep, SweptDevice
+from tests.support.fake_palm import FakePalm
 from tests.support.faults import SLAVE_TO_SAFEOP, WORKING_COUNTER_LOW, MessageLayout
 from tests.support.memory_port import MemoryPort
-from tests.unit.drivers.shadow.device.test_hand import FakePalm
 
 JOINTS = Path(rigs.__file__).parent / "calibrations" / "simulated-hand" / "joints.yaml"
 CALIBRATION = JointCalibration.load(JOINTS)

@@ -24,7 +24,7 @@ from drivers.shadow.protocol.motor_data import CONFIG_TYPES, MAX_PWM, MotorFlag,
 from drivers.shadow.protocol.palm_codec import PalmCommand
 from drivers.simulation.devices.motor_bank import GAUGE_COUNTS_PER_Nm, MotorBank
 from tactile_lab import rigs
-from tests.unit.drivers.shadow.device.test_hand import FakePalm
+from tests.support.fake_palm import FakePalm
 
 SIMULATED = Path(rigs.__file__).parent / "calibrations" / "simulated-hand"
 MOTORS = MotorMap.load()

@@ -15,7 +15,7 @@ from drivers.ethercat.master import Slave
 from drivers.ethercat.registers import AlState, SyncManager
 from drivers.shadow.ethercat.process_data_size import stated_sizes
 from drivers.shadow.protocol.palm_images import PALMS, PalmName
-from tests.unit.drivers.shadow.ethercat.test_hand_transport import Wire
+from tests.support.emulated_hand_wire import Wire
 
 
 def longer(managers: tuple[SyncManager, ...]) -> tuple[SyncManager, ...]:
