@@ -33,6 +33,8 @@ CoupledTable = Sequence[tuple[tuple[float, float], float, float]]
 """Calibration points ((counts of A, counts of B), degrees of A, degrees of B) of two joints."""
 
 _LARGEST_count, _LARGEST_deg = 4095, 180
+_STEEPEST_deg = 3.0
+"""Of one count. Published calibrations have at most 0.5 degrees; placeholders 7 and 11."""
 
 _AVERAGED = {"THJ5": ("THJ5A", "THJ5B"), "WRJ1": ("WRJ1A", "WRJ1B")}
 
@@ -170,7 +172,18 @@ def _checked_table(joint: str, table: Table, where: str) -> Array:
         raise ConfigurationError(
             f"the table of {joint} is not monotonic", where=where, hint="Each count needs its own angle"
         )
+    _refuse_placeholders(joint, steps, where)
     return points
+
+
+def _refuse_placeholders(joint: str, steps: Array, where: str) -> None:
+    """Some published folders fill what was never calibrated with counts such as 9, 7, 5, 3: monotonic, but a joint
+    would jump by many degrees from one count to the next.
+    """
+    steepest = max(steps, key=lambda step: abs(step[1]) / step[0])
+    if abs(steepest[1]) > _STEEPEST_deg * steepest[0]:
+        what = f"the table of {joint} has only {steepest[0]:g} counts for {abs(steepest[1]):g} degrees: placeholders"
+        raise ConfigurationError(what, where=where, hint="Calibrate the joint")
 
 
 def _plane(pair: tuple[str, str], points: CoupledTable, where: str) -> Plane:

@@ -6,15 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 
 from drivers.core.errors import ConfigurationError, DeviceError
-from drivers.shadow.device.hand_settings import HandSettings
-from drivers.shadow.device.hand_setup import HandSetup
-from drivers.shadow.ethercat.hand_transport import EthercatSettings
 from tests.support.emulated_hands import EmulatedBench, setup_of
 from tests.support.hand_family import DEFECTS, family, write_hand
 from tests.support.hand_folders import FOLDERS, FULL_RIGHT, HandFolder, write_folder
+from tests.support.published_hands_table import outcome, published_folders
 
 LITE = next(kind for kind in FOLDERS if kind.name == "rh_lite_v1")
 
@@ -112,39 +109,9 @@ def test_a_defect_of_a_calibration_is_named_with_its_file(tmp_path: Path, defect
         setup_of(write_hand(tmp_path, hand)).check_files()
 
 
-def published(lab_data: Path) -> list[Path]:
-    return sorted(path.parent for path in (lab_data / "shadow_hand_config").glob("*/general_info.yaml"))
-
-
-def setup_of_published(folder: Path, maps: Path) -> HandSetup:
-    """A hand by a folder as Shadow publishes it, and the map that its ``general_info.yaml`` names."""
-    info = yaml.safe_load((folder / "general_info.yaml").read_text())
-    named = {
-        "boards": next(folder.rglob("motor_board_effort_controllers.yaml"), None),
-        "gains": next(folder.rglob("sr_edc_joint_position_controllers_PWM.yaml"), None),
-    }
-    return HandSetup(
-        ethercat=EthercatSettings(interface="memory"),
-        hand=HandSettings(cycle_s=0.002),
-        joints=next(folder.rglob("calibration.yaml")),
-        motors=maps / Path(info["mapping_path"]["relative_path"]).name,
-        **named,
-    )
-
-
-def outcome(setup: HandSetup, serial: int) -> str:
-    """``moved``, or why not."""
-    try:
-        findings = EmulatedBench(setup, serial).moves()
-    except ConfigurationError as error:
-        return str(error)
-    wrong = [str(finding) for finding in findings if not finding.ok]
-    return "; ".join(wrong) or "moved"
-
-
 def test_published_folders_that_are_at_hand_move_or_are_refused_with_the_defect(lab_data: Path) -> None:
-    maps, folders = lab_data / "shadow_motor_maps", published(lab_data)
-    told = {folder: outcome(setup_of_published(folder, maps), int(folder.name)) for folder in folders}
+    maps, folders = lab_data / "shadow_motor_maps", published_folders([lab_data / "shadow_hand_config"])
+    told = {folder: outcome(folder, maps) for folder in folders}
     assert told
     for folder, words in told.items():
         if folder.name in UNDETERMINED:

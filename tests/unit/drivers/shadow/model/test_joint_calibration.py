@@ -170,6 +170,7 @@ def test_a_coupling_that_leaves_an_angle_open_cannot_be_emulated(lab_data: Path)
         ([(1000.0, 0.0), (1500.0, 0.0), (2000.0, 5.0)], "not monotonic"),
         ([(1000.0, 5.0), (1500.0, 0.0), (2000.0, 0.0)], "not monotonic"),
         ([(1000.0, 0.0), (2000.0, float("nan"))], "not monotonic"),
+        ([(4095.0, 0.0), (9.0, 22.5), (7.0, 45.0)], "only 2 counts for 22.5 degrees"),
     ],
 )
 def test_an_unusable_table_is_refused_with_the_joint_named(table: list[tuple[float, float]], problem: str) -> None:

@@ -1,0 +1,107 @@
+"""Configuration folders of hands as Shadow publishes them, on the emulated ring, as a table.
+
+python -m tests.support.published_hands_table FOLDER ... --maps FOLDER --store
+
+The folders are not part of this repository: a user names them, and the folder of motor maps beside them. Only counts
+and reasons are stored.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+
+from drivers.core import configuration
+from drivers.core.errors import ConfigurationError, TactileLabError
+from drivers.shadow.device.hand_settings import HandSettings
+from drivers.shadow.device.hand_setup import HandSetup
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
+from drivers.shadow.model.hand_form import HandForm
+from drivers.shadow.model.hand_info import INFO_FILE, HandInfo, stated_serial
+from tests.support.emulated_hands import EmulatedBench
+from tests.support.stored_table import GrowingTable, Outline, parser
+
+_COMMAND = "python -m tests.support.published_hands_table FOLDER ... --maps FOLDER --store"
+OUTLINE = Outline(
+    "published-hands",
+    "Folders of real hands as Shadow publishes them: loaded and moved motor by motor, or refused with the reason.",
+    (_COMMAND,),
+    "Every folder with a `general_info.yaml` below those that were named, with the motor map that it names. It is "
+    "checked as by `rig check --move`, on the emulated ring in one process and virtual time. Which folders these were "
+    "is not part of this repository; reasons are given without their numbers.",
+    ("Kind", "Motor map", "Outcome", "Hands"),
+    keys=3,
+)
+
+
+def published_folders(roots: Iterable[Path]) -> list[Path]:
+    """Folders of hands below these, sorted."""
+    return sorted({place.parent for root in roots for place in root.rglob(INFO_FILE)})
+
+
+def map_name(folder: Path) -> str:
+    """The file of the motor map that a folder names. Raises ConfigurationError."""
+    info = _info(folder)
+    if info.mapping_path is None:
+        raise ConfigurationError("names no motor map", where=str(folder / INFO_FILE), hint="Give mapping_path")
+    return info.mapping_path.relative_path.name
+
+
+def published_setup(folder: Path, maps: Path) -> HandSetup:
+    """A hand by its published folder. Raises ConfigurationError."""
+    found = {
+        "joints": "calibration.yaml",
+        "boards": "motor_board_effort_controllers.yaml",
+        "gains": "sr_edc_joint_position_controllers_PWM.yaml",
+    }
+    files = {key: file for key, name in found.items() if (file := next(iter(sorted(folder.rglob(name))), None))}
+    if "joints" not in files:
+        raise ConfigurationError("has no calibration.yaml", where=str(folder), hint="Ask Shadow for the hand's folder")
+    ethercat = EthercatSettings(interface="memory")
+    return HandSetup(ethercat=ethercat, hand=HandSettings(cycle_s=0.002), motors=maps / map_name(folder), **files)
+
+
+def outcome(folder: Path, maps: Path) -> str:
+    """``moved``, or why not."""
+    try:
+        setup = published_setup(folder, maps)
+        findings = EmulatedBench(setup, stated_serial(setup.infos()) or 634).moves()
+    except TactileLabError as error:
+        return str(error)
+    return "; ".join(str(finding) for finding in findings if not finding.ok) or "moved"
+
+
+def kind(folder: Path, maps: Path) -> tuple[str, str]:
+    """Side and number of fingers in words, and the motor map; what the folder does not tell is left out."""
+    try:
+        form: HandForm = published_setup(folder, maps).form()
+    except TactileLabError:
+        return "not readable", ""
+    return f"{form.side}, {len(form.fingers)} fingers", Path(map_name(folder)).stem
+
+
+def _info(folder: Path) -> HandInfo:
+    place = folder / INFO_FILE
+    return configuration.validate(configuration.load(place), HandInfo, where=str(place))
+
+
+def main() -> None:
+    """Print the table, and store it if requested."""
+    options = parser(__doc__)
+    options.add_argument("folders", nargs="+", type=Path, help="folders of hands, or above them")
+    options.add_argument("--maps", type=Path, required=True, help="folder of Shadow's motor maps (rh_E_v3.yaml ...)")
+    chosen = options.parse_args()
+    groups = defaultdict[tuple[str, str, str], int](int)
+    for folder in published_folders(chosen.folders):
+        words = outcome(folder, chosen.maps)
+        print(f"{folder}: {words}", flush=True)
+        groups[*kind(folder, chosen.maps), words.replace(f"{folder}/", "").replace(f"{chosen.maps}/", "")] += 1
+    table = GrowingTable(chosen.docs, OUTLINE, sorted(groups))
+    for key in sorted(groups):
+        table.put(key, (str(groups[key]),))
+    table.publish()
+
+
+if __name__ == "__main__":
+    main()
