@@ -50,16 +50,17 @@ def map_name(folder: Path) -> str:
 
 def published_setup(folder: Path, maps: Path) -> HandSetup:
     """A hand by its published folder. Raises ConfigurationError."""
-    found = {
-        "joints": "calibration.yaml",
-        "boards": "motor_board_effort_controllers.yaml",
-        "gains": "sr_edc_joint_position_controllers_PWM.yaml",
-    }
-    files = {key: file for key, name in found.items() if (file := next(iter(sorted(folder.rglob(name))), None))}
-    if "joints" not in files:
+    joints = _file(folder, "calibration.yaml")
+    if joints is None:
         raise ConfigurationError("has no calibration.yaml", where=str(folder), hint="Ask Shadow for the hand's folder")
-    ethercat = EthercatSettings(interface="memory")
-    return HandSetup(ethercat=ethercat, hand=HandSettings(cycle_s=0.002), motors=maps / map_name(folder), **files)
+    return HandSetup(
+        ethercat=EthercatSettings(interface="memory"),
+        hand=HandSettings(cycle_s=0.002),
+        joints=joints,
+        motors=maps / map_name(folder),
+        boards=_file(folder, "motor_board_effort_controllers.yaml"),
+        gains=_file(folder, "sr_edc_joint_position_controllers_PWM.yaml"),
+    )
 
 
 def outcome(folder: Path, maps: Path) -> str:
@@ -79,6 +80,10 @@ def kind(folder: Path, maps: Path) -> tuple[str, str]:
     except TactileLabError:
         return "not readable", ""
     return f"{form.side}, {len(form.fingers)} fingers", Path(map_name(folder)).stem
+
+
+def _file(folder: Path, name: str) -> Path | None:
+    return next(iter(sorted(folder.rglob(name))), None)
 
 
 def _info(folder: Path) -> HandInfo:
