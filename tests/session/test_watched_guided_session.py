@@ -1,7 +1,8 @@
-"""A guided session with the live page and the viewers' server open is, byte for byte, the one that nobody watches."""
+"""A guided session with live page and viewers' server open is, but for measured times, byte for byte the one unwatched."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -13,9 +14,15 @@ from tests.support.watched_sessions import PATIENCE_s, guided
 pytestmark = pytest.mark.long
 
 
+MEASURED_SECONDS = re.compile(rb'"seconds":[0-9.e-]+')
+"""What the estimation took, in the messages of its state."""
+
+
 def recorded(folder: Path) -> list[tuple[str, bytes, int]]:
     traffic = Session.open(folder).traffic()
-    messages = [(message.topic, message.data, message.stamp_ns) for message in traffic.messages()]
+    messages = [
+        (message.topic, MEASURED_SECONDS.sub(b"", message.data), message.stamp_ns) for message in traffic.messages()
+    ]
     assert not traffic.loss
     return messages
 
@@ -27,8 +34,8 @@ def test_a_watched_guided_session_records_what_an_unwatched_one_does(
     monkeypatch.setattr(process_feed, "START_TIMEOUT_s", PATIENCE_s)
     alone = guided(tmp_path / "alone", "sim", 1, watched=False)
     watched = guided(tmp_path / "watched", "sim", 1, watched=True)
-    assert watched.counts["cycles"] == alone.counts["cycles"]
-    assert watched.counts["overruns"] == alone.counts["overruns"] == 0
+    assert watched.counts == alone.counts
+    assert watched.counts["overruns"] == 0
     assert watched.counts["grasps"] == 1
     assert watched.received > 100
     assert recorded(watched.folder) == recorded(alone.folder)

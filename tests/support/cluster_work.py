@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
+import time
+from typing import Any
 
 from drivers.core.errors import TrackingError
 from tactile_lab.experiments.cells import Cell
+from tactile_lab.experiments.runs.tracking_runs import track_in_plane
 
 
 def square(cell: Cell) -> dict[str, float]:
@@ -31,3 +35,12 @@ def deadly(cell: Cell) -> dict[str, float]:
 def sees_nothing(file: str) -> bool:
     """As a worker that does not share the folder."""
     return False
+
+
+def measured(cell: Cell) -> dict[str, Any]:
+    """A session's figures, the process that made it, what it cost, and the most memory that its process has held."""
+    begun_s = time.process_time()
+    figures = track_in_plane(cell)
+    most_kB = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    spent_s = time.process_time() - begun_s
+    return {**figures, "process": os.getpid(), "cpu_s": spent_s, "resident_MB": most_kB / 1024}
