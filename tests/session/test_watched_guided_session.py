@@ -1,4 +1,4 @@
-"""A guided session with live page and viewers' server open is, but for measured times, byte for byte the one unwatched."""
+"""A guided session with page and viewers is, but for measured times, byte for byte the one that nobody watches."""
 
 from __future__ import annotations
 

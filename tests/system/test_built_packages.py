@@ -79,3 +79,38 @@ def test_the_program_runs_from_an_installed_wheel(built: tuple[Path, Path], tmp_
         [sys.executable, "-P", "-c", where], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
     )
     assert all(file.startswith(str(installed)) for file in told.stdout.split())
+
+
+def install(wheel: Path, python: str, folder: Path) -> Path:
+    """The base and nothing else in an environment of its own, from packages that are on this disk; its program."""
+    uv = str(Path(sys.executable).parent / "uv")
+    quiet = {"capture_output": True, "text": True, "check": False}
+    if subprocess.run([uv, "python", "find", "--offline", python], **quiet).returncode:  # type: ignore[call-overload]
+        pytest.skip(f"there is no Python {python} here")
+    subprocess.run([uv, "venv", "--quiet", "--offline", "--python", python, str(folder)], check=True)
+    words = [uv, "pip", "install", "--offline", "--constraint", str(REPOSITORY / "requirements.lock")]
+    done = subprocess.run([*words, "--python", str(folder / "bin" / "python"), str(wheel)], **quiet)  # type: ignore[call-overload]
+    if "network was disabled" in done.stderr:
+        pytest.skip(f"not all packages of the base are on this disk for Python {python}")
+    assert done.returncode == 0, done.stderr
+    return folder / "bin" / "tactile-lab"
+
+
+@pytest.mark.parametrize(("python", "kind"), [("3.11", 1), ("3.12", 0), ("3.13", 1)])
+def test_the_base_does_its_work_in_every_python(
+    built: tuple[Path, Path], python: str, kind: int, session_copy: Path, tmp_path: Path
+) -> None:
+    """Installed from the wheel or by way of the sdist: the results are those of the session itself."""
+    program = install(built[kind], python, tmp_path / "environment")
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    (session_copy / "results" / "report.html").unlink()
+    for words in ("reconstruct session --out again", "evaluate session --out figures", "report session"):
+        command = [str(program), *words.split()]
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        assert done.returncode in (0, 3), done.stderr
+    for file in ("trajectory.csv", "contour.csv", "mesh.ply"):
+        ours = session_copy / "results" / file
+        assert not ours.is_file() or (tmp_path / "again" / file).read_bytes() == ours.read_bytes()
+    assert (session_copy / "results" / "trajectory.csv").is_file()
+    assert (session_copy / "results" / "report.html").is_file()
+    assert (tmp_path / "figures" / "comparison.json").is_file()
