@@ -98,11 +98,12 @@ def _wait(file: Path, rows: int, client: subprocess.Popen[bytes]) -> None:
 
 def _memory(rows: Sequence[Row]) -> tuple[float, float]:
     """The most that the process with the most sessions has held: after a quarter of its sessions, and at its end."""
-    by_process: dict[int, list[float]] = {}
+    held: dict[int, list[float]] = {}
     for row in rows:
         if row.figures:
-            by_process.setdefault(row.figures["process"], []).append(row.figures["resident_MB"])
-    longest = sorted(max(by_process.values(), key=lambda held: len(held)))
+            held.setdefault(row.figures["process"], []).append(row.figures["resident_MB"])
+    longest: list[float] = max(held.values(), key=len)
+    longest.sort()  # in the order of the sessions: the most so far never falls
     return longest[len(longest) // 4], longest[-1]
 
 
