@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from drivers.core.atomic_files import write_whole
+from drivers.core.atomic_files import refuse_unwritable, write_whole
 from drivers.core.errors import ConfigurationError, TactileLabError, WriteError
 from drivers.core.installed.extras import require_package
 
@@ -24,6 +24,9 @@ _PACKAGES = {"s3": "s3fs", "s3a": "s3fs"}
 
 _WITHOUT_FOLDERS = frozenset({"s3", "s3a", "gs", "gcs", "az", "abfs", "memory"})
 """Stores whose folders are but names; to make one could make a bucket."""
+
+_PROBE = ".tactile-lab-may-write"
+"""An empty file that shows whether one may write somewhere; one name for all, should it not be removable."""
 
 
 def address_of(path: Path | str) -> str | None:
@@ -48,6 +51,16 @@ def write_anywhere(path: Path, content: str | bytes, hint: str = "Choose another
         return
     folder, _, name = address.rpartition("/")
     Place(folder).write(name, content.encode() if isinstance(content, str) else content)
+
+
+def refuse_unwritable_anywhere(path: Path) -> None:
+    """Raise as :func:`write_anywhere` would, before the work whose result is to be written there."""
+    if (address := address_of(path)) is None:
+        refuse_unwritable(path)
+        return
+    place = Place(address.rpartition("/")[0])
+    place.write(_PROBE, b"")
+    place.remove([_PROBE])
 
 
 class Place:

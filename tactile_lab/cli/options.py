@@ -132,9 +132,9 @@ Merge = Annotated[
 def writable_file(path: Path | None) -> Path | None:
     """A file that cannot be written is named before minutes or hours of work, not after them."""
     if path is not None:
-        from drivers.core.atomic_files import refuse_unwritable
+        from sessions.exchange.addresses import refuse_unwritable_anywhere
 
-        refuse_unwritable(path)
+        refuse_unwritable_anywhere(path)
     return path
 
 

@@ -11,11 +11,13 @@ only those of the process pool.
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from tactile_lab.experiments.cells import Cell, Row, grid
@@ -36,7 +38,8 @@ OUTLINE = Outline(
     ("python -m tests.support.cluster_table --sessions 1000 --store",),
     "A scheduler, two workers and the client on a machine of two cores. A worker is killed (SIGKILL) when a third of "
     "the sessions is made, the client when two thirds are, and started again. Efficiency: processor time of the "
-    "sessions that are in the table, by twice the seconds from the first client's start to the second one's end. "
+    "sessions that are in the table, by that which there was for them: of all processes of the study, from the first "
+    "client's start to the second one's end, and what the two cores were idle meanwhile. "
     "Memory: the largest that a worker process has held when a quarter of its sessions were made, and at its end.",
     (
         "Sessions, method",
@@ -72,12 +75,28 @@ def _timed(row: Row) -> list[str]:
     return [name for name in row.figures or {} if name.endswith(("_s", "_ms"))]
 
 
-def killed_on_the_way(cells: Sequence[Cell], arguments: Sequence[str], folder: Path) -> float:
-    """Run the sessions on a cluster, killing a worker and the client; the seconds from start to end."""
+@dataclass(frozen=True)
+class Spent:
+    """Seconds from start to end, and the processor time that there was: used by the study's processes, and idle."""
+
+    whole_s: float
+    used_s: float
+    idle_s: float
+
+
+def killed_on_the_way(cells: Sequence[Cell], arguments: Sequence[str], folder: Path) -> Spent:
+    """Run the sessions on a cluster, killing a worker and the client."""
+    used_s = _children_s()
+    whole_s, idle_s = _on_cluster(cells, arguments, folder)
+    return Spent(whole_s, _children_s() - used_s, idle_s)  # children are counted once they have ended
+
+
+def _on_cluster(cells: Sequence[Cell], arguments: Sequence[str], folder: Path) -> tuple[float, float]:
+    """Seconds, and those of idle cores."""
     file = folder / "cluster.jsonl"
     with DaskCluster(folder, WORKERS) as cluster:
         words = [sys.executable, "-m", __spec__.name, *arguments, "--scheduler", cluster.address]
-        begun_s = time.monotonic()
+        begun_s, idle_s = time.monotonic(), _idle_s()
         client = subprocess.Popen(words, cwd=REPOSITORY)
         _wait(file, len(cells) // 3, client)
         worker = next(row.figures["process"] for row in kept_rows(NAME, file) if row.figures)
@@ -86,7 +105,18 @@ def killed_on_the_way(cells: Sequence[Cell], arguments: Sequence[str], folder: P
         client.kill()
         client.wait()
         subprocess.run(words, cwd=REPOSITORY, check=True)
-        return time.monotonic() - begun_s
+        return time.monotonic() - begun_s, _idle_s() - idle_s
+
+
+def _children_s() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def _idle_s() -> float:
+    """Of all cores since the machine's start."""
+    times = Path("/proc/stat").read_text().split()
+    return (int(times[4]) + int(times[5])) / os.sysconf("SC_CLK_TCK")
 
 
 def _wait(file: Path, rows: int, client: subprocess.Popen[bytes]) -> None:
@@ -122,33 +152,33 @@ def main() -> None:
         run_cells(NAME, cells, measured, chosen.out / "cluster.jsonl", RunnerSettings(scheduler=chosen.scheduler))
         return
     pooled = run_cells(NAME, cells, measured, chosen.out / "pool.jsonl", RunnerSettings(jobs=WORKERS))
-    if chosen.pool:
-        return
-    (chosen.out / "cluster.jsonl").unlink(missing_ok=True)
-    arguments = ["--sessions", str(chosen.sessions), "--method", chosen.method, "--out", str(chosen.out.resolve())]
-    seconds = killed_on_the_way(cells, arguments, chosen.out)
-    by_cell = {row.cell.key: row for row in kept_rows(NAME, chosen.out / "cluster.jsonl")}
-    _put(
-        GrowingTable(chosen.docs, OUTLINE, [(_key(chosen.sessions, chosen.method),)]),
-        chosen.method,
-        pooled,
-        [by_cell[cell.key] for cell in cells],
-        seconds,
-    )
+    if not chosen.pool:
+        table = GrowingTable(chosen.docs, OUTLINE, [(_key(len(cells), chosen.method),)])
+        _put(table, chosen.method, pooled, *_made_again(cells, chosen.method, chosen.out))
+
+
+def _made_again(cells: Sequence[Cell], method: str, out: Path) -> tuple[list[Row], Spent]:
+    """The rows that the cluster makes, none of an earlier study among them."""
+    file = out / "cluster.jsonl"
+    file.unlink(missing_ok=True)
+    arguments = ["--sessions", str(len(cells)), "--method", method, "--out", str(out.resolve())]
+    spent = killed_on_the_way(cells, arguments, out)
+    by_cell = {row.cell.key: row for row in kept_rows(NAME, file)}
+    return [by_cell[cell.key] for cell in cells], spent
 
 
 def _key(sessions: int, method: str) -> str:
     return f"{sessions}, {method}"
 
 
-def _put(table: GrowingTable, method: str, pooled: Sequence[Row], made: Sequence[Row], seconds: float) -> None:
-    spent_s = sum(row.figures["cpu_s"] for row in made if row.figures)
+def _put(table: GrowingTable, method: str, pooled: Sequence[Row], made: Sequence[Row], spent: Spent) -> None:
+    sessions_s = sum(row.figures["cpu_s"] for row in made if row.figures)
     early, late = _memory(made)
     figures = (
         "all" if same_rows(pooled, made) else "NO",
-        f"{spent_s / len(made):.2f}",
-        f"{seconds:.0f}",
-        f"{spent_s / (WORKERS * seconds):.0%}",
+        f"{sessions_s / len(made):.2f}",
+        f"{spent.whole_s:.0f}",
+        f"{sessions_s / (spent.used_s + spent.idle_s):.0%}",
         f"{early:.0f}",
         f"{late:.0f}",
     )

@@ -14,6 +14,7 @@ import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PACKAGES = ("tactile_lab", "drivers", "calibration", "sessions")
+UV = str(Path(sys.executable).parent / "uv")
 BUILD = "import sys; from setuptools import build_meta as b; print(getattr(b, sys.argv[1])(sys.argv[2]))"
 
 pytestmark = pytest.mark.long
@@ -81,19 +82,35 @@ def test_the_program_runs_from_an_installed_wheel(built: tuple[Path, Path], tmp_
     assert all(file.startswith(str(installed)) for file in told.stdout.split())
 
 
+def interpreter(python: str) -> str:
+    """Of this version: the running one, one that uv finds, or one of pyenv."""
+    if python == f"{sys.version_info.major}.{sys.version_info.minor}":
+        return sys.executable
+    found = run(UV, "python", "find", "--offline", python)
+    if found.returncode == 0:
+        return found.stdout.strip()
+    root = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv"))
+    for program in sorted(root.glob(f"versions/{python}.*/bin/python")):
+        return str(program)
+    pytest.skip(f"there is no Python {python} here")
+
+
 def install(wheel: Path, python: str, folder: Path) -> Path:
     """The base and nothing else in an environment of its own, from packages that are on this disk; its program."""
-    uv = str(Path(sys.executable).parent / "uv")
-    quiet = {"capture_output": True, "text": True, "check": False}
-    if subprocess.run([uv, "python", "find", "--offline", python], **quiet).returncode:  # type: ignore[call-overload]
-        pytest.skip(f"there is no Python {python} here")
-    subprocess.run([uv, "venv", "--quiet", "--offline", "--python", python, str(folder)], check=True)
-    words = [uv, "pip", "install", "--offline", "--constraint", str(REPOSITORY / "requirements.lock")]
-    done = subprocess.run([*words, "--python", str(folder / "bin" / "python"), str(wheel)], **quiet)  # type: ignore[call-overload]
+    made = run(UV, "venv", "--offline", "--python", interpreter(python), str(folder))
+    assert made.returncode == 0, made.stderr
+    locked = ("--offline", "--constraint", str(REPOSITORY / "requirements.lock"))
+    done = run(UV, "pip", "install", *locked, "--python", str(folder / "bin" / "python"), str(wheel))
     if "network was disabled" in done.stderr:
         pytest.skip(f"not all packages of the base are on this disk for Python {python}")
     assert done.returncode == 0, done.stderr
     return folder / "bin" / "tactile-lab"
+
+
+def run(*words: str, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """A command that knows nothing of the running Python's packages."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    return subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
 
 
 @pytest.mark.parametrize(("python", "kind"), [("3.11", 1), ("3.12", 0), ("3.13", 1)])
@@ -102,11 +119,9 @@ def test_the_base_does_its_work_in_every_python(
 ) -> None:
     """Installed from the wheel or by way of the sdist: the results are those of the session itself."""
     program = install(built[kind], python, tmp_path / "environment")
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     (session_copy / "results" / "report.html").unlink()
     for words in ("reconstruct session --out again", "evaluate session --out figures", "report session"):
-        command = [str(program), *words.split()]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+        done = run(str(program), *words.split(), folder=tmp_path)
         assert done.returncode in (0, 3), done.stderr
     for file in ("trajectory.csv", "contour.csv", "mesh.ply"):
         ours = session_copy / "results" / file

@@ -9,7 +9,7 @@ import pytest
 from fsspec.implementations.memory import MemoryFileSystem
 
 from drivers.core.errors import ConfigurationError, WriteError
-from sessions.exchange.addresses import Place, address_of, checked_name
+from sessions.exchange.addresses import Place, address_of, checked_name, refuse_unwritable_anywhere
 from sessions.exchange.elsewhere import fetch_session, list_elsewhere, store_session
 from sessions.recording.listing import list_sessions
 from sessions.recording.session import Session
@@ -127,3 +127,14 @@ def test_a_catalogue_is_written_to_an_address(closed, tmp_path, kind):
 def test_a_kind_of_address_that_nobody_knows_is_one_sentence():
     with pytest.raises(ConfigurationError, match="no such kind of address is known"):
         Place("nowhere://lab/a")
+    with pytest.raises(ConfigurationError, match="no such kind of address is known"):
+        refuse_unwritable_anywhere(Path("nowhere://lab/a.csv"))
+
+
+def test_that_a_file_can_be_written_is_found_out_before_and_leaves_nothing(tmp_path):
+    refuse_unwritable_anywhere(Path(f"{HERE}/a.csv"))
+    assert Place(HERE).names() == {}
+    refuse_unwritable_anywhere(tmp_path / "a.csv")
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(ConfigurationError, match="is a folder"):
+        refuse_unwritable_anywhere(tmp_path)

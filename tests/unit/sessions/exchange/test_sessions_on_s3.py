@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivers.core.errors import ConfigurationError, WriteError
-from sessions.exchange.addresses import Place, write_anywhere
+from sessions.exchange.addresses import Place, refuse_unwritable_anywhere, write_anywhere
 from sessions.exchange.elsewhere import fetch_session, store_session
 from sessions.recording.session import Session
 from tactile_lab.workflow.cataloguing import catalogue
@@ -69,6 +69,7 @@ def test_a_bucket_that_is_not_there_is_one_sentence(bucket, closed):
         lambda: store_session(closed, "s3://nobody-s/runs"),
         lambda: catalogue([Path("s3://nobody-s/runs")]),
         lambda: write_anywhere(Path("s3://nobody-s/all.csv"), "a table"),
+        lambda: refuse_unwritable_anywhere(Path("s3://nobody-s/all.csv")),
     ):
         with pytest.raises(ConfigurationError, match="there is no such bucket, folder or file"):
             attempt()
@@ -85,3 +86,11 @@ def test_a_bucket_that_is_read_only_is_one_sentence(bucket, closed, monkeypatch)
     monkeypatch.setattr(s3fs.S3FileSystem, "_call_s3", denied)
     with pytest.raises(WriteError, match="one may not read or write there with these credentials"):
         write_anywhere(Path(f"{bucket}/all.csv"), "a table")
+    with pytest.raises(WriteError, match="one may not read or write there with these credentials"):
+        refuse_unwritable_anywhere(Path(f"{bucket}/all.csv"))
+
+
+def test_that_one_may_write_is_found_out_without_a_trace(bucket):
+    before = Place(bucket).names()
+    refuse_unwritable_anywhere(Path(f"{bucket}/later.parquet"))
+    assert Place(bucket).names() == before
