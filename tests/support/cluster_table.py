@@ -17,7 +17,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tactile_lab.experiments.cells import Cell, Row, grid
@@ -153,7 +153,9 @@ def main() -> None:
         return
     pooled = run_cells(NAME, cells, measured, chosen.out / "pool.jsonl", RunnerSettings(jobs=WORKERS))
     if not chosen.pool:
-        table = GrowingTable(chosen.docs, OUTLINE, [(_key(len(cells), chosen.method),)])
+        command = f"python -m tests.support.cluster_table --sessions {len(cells)} --store"
+        outline = replace(OUTLINE, commands=(command,))
+        table = GrowingTable(chosen.docs, outline, [(_key(len(cells), chosen.method),)])
         _put(table, chosen.method, pooled, *_made_again(cells, chosen.method, chosen.out))
 
 
