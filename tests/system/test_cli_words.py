@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -167,7 +168,6 @@ def test_the_rigs_are_listed_for_people_and_for_programs(inside):
         (("run", "--rig", "nowhere"), "nowhere"),
         (("run", "--method", "known-pose"), "known-pose"),
         (("run", "--object", "mesh:none.ply"), "none.ply: file not found"),
-        (("reconstruct", "none.json", "--shape", "guess"), "guess"),
     ],
 )
 def test_what_does_not_exist_is_told_before_anything_is_begun(inside, words, told, tmp_path, monkeypatch):
@@ -177,12 +177,22 @@ def test_what_does_not_exist_is_told_before_anything_is_begun(inside, words, tol
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tactile_lab.workflow.running.open_laboratory", begun)
     monkeypatch.setattr("tactile_lab.workflow.running.check_calibration", begun)
-    monkeypatch.setattr("tactile_lab.workflow.reconstructing.read_contact_log", begun)
     answer = inside(*words)
     assert (answer.code, answer.out) == (2, "")
     assert told in answer.err
     assert "Value error" not in answer.err
     assert not list(tmp_path.iterdir())
+
+
+def test_a_shape_that_does_not_exist_is_told_before_anything_is_estimated(inside, tmp_path):
+    contact = {"finger": "FF", "point_world_m": [0.03, 0.0, 0.0], "normal_world": [1.0, 0.0, 0.0]}
+    log = {"format": "tactile-contacts/1", "dimension": 2, "point_sigma_m": 0.001, "normal_sigma_rad": 0.1}
+    path = tmp_path / "log.json"
+    path.write_text(json.dumps({**log, "grasps": [{"contacts": [contact], "hand_motion_world": np.eye(4).tolist()}]}))
+    answer = inside("reconstruct", path, "--shape", "guess", "--out", tmp_path / "out")
+    assert (answer.code, answer.out) == (2, "")
+    assert "there is no shape model 'guess'" in answer.err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

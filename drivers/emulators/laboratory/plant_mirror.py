@@ -1,7 +1,9 @@
 """Shared memory of one laboratory's emulators: the plant's newest state, and the demands that drive it.
 
 The plant's process writes the state after every step and reads the demands before the next. Emulators, each in its own
-process, read the state whenever their device would measure, and write their own demand. No process waits for another.
+process, read the state whenever their device would measure, and write their own demand. No process waits for another:
+what is being written lies beside what is read. Emulators have real-time priorities above the plant's; one that waited
+until the plant has written would keep it from writing.
 """
 
 from __future__ import annotations
@@ -38,18 +40,20 @@ _CONTACT = np.dtype(
 _TOUCHES = np.dtype(
     [("world_T_distal", "<f8", (len(FINGERS), 4, 4)), ("count", "<i4"), ("contact", _CONTACT, _MOST_CONTACTS)]
 )
+_PLACES = 8
+"""The plant writes in turn to so many: a reader has copied from one long before it is written again."""
 _MEMORY = np.dtype(
     [
-        ("beat", "<u8"),  # odd while the state or the touches are being written
         ("stamp_ns", "<i8"),
         ("lost_ns", "<i8"),
-        ("state", _STATE),
-        ("touches", _TOUCHES),
+        ("state_count", "<u8"),  # how many were written; the newest lies at its place modulo _PLACES
+        ("state", _STATE, _PLACES),
+        ("touches_count", "<u8"),
+        ("touches", _TOUCHES, _PLACES),
         ("duty", "<f8", 20),
         ("base_target", "<f8", 6),
     ]
 )
-_TRIES = 1000
 
 
 class PlantMirror:
@@ -145,22 +149,20 @@ class PlantMirror:
         self, stamp_ns: int, joints_rad: Array, torque_Nm: Array, base: Array, wrenches: Array, world_T_object: Pose3
     ) -> None:
         """Publish a new state; see the properties for shapes."""
-        memory = self._memory
-        memory["beat"] += 1
-        memory["state"][0] = (joints_rad, torque_Nm, base, wrenches, world_T_object.matrix())
+        memory, count = self._memory, self._next("state")
+        memory["state"][0, count % _PLACES] = (joints_rad, torque_Nm, base, wrenches, world_T_object.matrix())
         memory["stamp_ns"] = stamp_ns
-        memory["beat"] += 1
+        memory["state_count"] = count
 
     def publish_touches(self, contacts: Sequence[TrueContact], world_T_distal: Sequence[Pose3]) -> None:
         """Publish the fingertips' contacts (if there are too many, the first), and the distal frames of all fingers."""
         rows = [_row(contact) for contact in contacts[:_MOST_CONTACTS]]
-        memory = self._memory
-        memory["beat"] += 1
-        touches = memory["touches"][0]
+        count = self._next("touches")
+        touches = self._memory["touches"][0, count % _PLACES]
         touches["world_T_distal"] = [pose.matrix() for pose in world_T_distal]
         touches["contact"][: len(rows)] = rows
         touches["count"] = len(rows)
-        memory["beat"] += 1
+        self._memory["touches_count"] = count
 
     def count_lost(self, lost_ns: int) -> None:
         """Count time that the plant skipped because it was late."""
@@ -181,15 +183,18 @@ class PlantMirror:
     def _state(self) -> NDArray[np.void]:
         return self._read("state")
 
+    def _next(self, part: str) -> int:
+        """The count of the one that is written next."""
+        return int(self._memory[f"{part}_count"][0]) + 1
+
     def _read(self, part: str) -> NDArray[np.void]:
-        """Read a part of the memory that is not being written meanwhile; after too many tries, the last reading."""
+        """The newest that was written whole; copied again if the plant has come round to its place meanwhile."""
         memory = self._memory
-        for _ in range(_TRIES):
-            before = int(memory["beat"][0])
-            content: NDArray[np.void] = memory[part][0].copy()
-            if not before & 1 and int(memory["beat"][0]) == before:
-                break
-        return content
+        while True:
+            count = int(memory[f"{part}_count"][0])
+            content: NDArray[np.void] = memory[part][0, count % _PLACES].copy()
+            if int(memory[f"{part}_count"][0]) < count + _PLACES - 1:
+                return content
 
 
 def _row(contact: TrueContact) -> tuple[object, ...]:
