@@ -64,17 +64,16 @@ def _units(directions: Array, where: str) -> Array:
     return np.asarray(directions / length[:, None])
 
 
-def _reason(error: Exception) -> str:
-    """The reason in an error, without the operating system's error number."""
-    return str(getattr(error, "strerror", None) or error)
-
-
 def _matrix(path: Path) -> Array:
     try:
         values = np.loadtxt(io.BytesIO(read_bounded(path, LARGEST_TABLE_bytes)), ndmin=2)
-    except (OSError, ValueError) as error:
-        hint = "Give a text file of numbers, one column per sample"
-        raise ConfigurationError(f"cannot be read ({_reason(error)})", where=str(path), hint=hint) from error
+    except OSError as error:
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
+    except ValueError as error:
+        hint = "Give a text file of numbers, one column per sample and as many in every line"
+        raise ConfigurationError("is not a table of numbers", where=str(path), hint=hint) from error
     if not np.isfinite(values).all():
         raise ConfigurationError("contains values that are not numbers", where=str(path), hint="Remove those samples")
     return np.asarray(values.T)
@@ -84,9 +83,13 @@ def _table(path: Path) -> tuple[Array, Array]:
     try:
         text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8")
         rows = list(csv.reader(io.StringIO(text, newline="")))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        hint = "Give a CSV table"
-        raise ConfigurationError(f"cannot be read ({_reason(error)})", where=str(path), hint=hint) from error
+    except OSError as error:
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        hint = "Give comma-separated values in UTF-8"
+        raise ConfigurationError("is not a text file of a table", where=str(path), hint=hint) from error
     electrodes = len(rows[0]) - len(_NORMAL) if rows else 0
     names = [f"e{number}" for number in range(1, electrodes + 1)]
     if not rows or [name.strip().lower() for name in rows[0]] != [*names, *_NORMAL]:

@@ -59,15 +59,8 @@ def _read(path: Path) -> trimesh.Trimesh:
     refuse_unreachable(path)
     if not path.is_file():
         raise ConfigurationError("file not found", where=str(path), hint="Check the path of the mesh")
-    try:
-        with warnings.catch_warnings(action="ignore"):  # numbers that are too large are told below
-            mesh = load_foreign_mesh(path, force="mesh")
-    except ConfigurationError:
-        raise
-    except Exception as error:  # the readers of a dozen formats raise all kinds of exceptions
-        raise ConfigurationError(
-            f"cannot be read as a mesh ({error})", where=str(path), hint="Give a PLY, STL, OBJ or GLB file"
-        ) from error
+    with warnings.catch_warnings(action="ignore"):  # numbers that are too large are told below
+        mesh = load_foreign_mesh(path, force="mesh")
     if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
         raise ConfigurationError("contains no triangles", where=str(path), hint="Export the object as a triangle mesh")
     if len(mesh.faces) > MOST_TRIANGLES:

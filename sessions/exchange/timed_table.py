@@ -58,8 +58,11 @@ def read_csv(path: Path) -> list[dict[str, str]]:
         raise ConfigurationError(
             f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
         ) from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise ConfigurationError(f"is not a CSV table ({error})", where=str(path)) from error
+    except UnicodeDecodeError as error:
+        raise ConfigurationError("is not a text file", where=str(path), hint="Give a CSV table in UTF-8") from error
+    except csv.Error as error:
+        what = "is not a CSV table: an entry of it is longer than 131,072 characters, or a quotation does not end"
+        raise ConfigurationError(what, where=str(path), hint="Check its quotation marks") from error
     if len(set(names)) < len(names):
         raise ConfigurationError("two columns have the same name", where=str(path), hint="Name every column once")
     check_columns(set(names), path)

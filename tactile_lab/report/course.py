@@ -97,9 +97,8 @@ def _read(message: TrafficMessage, path: Path, form: Callable[[dict[str, Any], i
     try:
         return form(json.loads(message.data), message.stamp_ns)
     except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-        raise SessionDataError(
-            f"a message on {message.topic} has an unexpected format ({error!r})", where=str(path)
-        ) from error
+        what = f"a message on {message.topic} does not have the form of its topic"
+        raise SessionDataError(what, where=str(path), hint="Was it written by another program?") from error
 
 
 def _decision(content: dict[str, Any], stamp_ns: int) -> PolicyDecision:

@@ -78,6 +78,7 @@ class Outcome:
         """What was asked for and is not so; "" if all is."""
         found = {
             "a traceback": self.traceback,
+            "an error of the program": "the program itself failed" in self.said,
             "ended by a signal": self.code < 0,
             "no word": not self.said,
             f"more than {MOST_s:g} s": self.processor_s > MOST_s,

@@ -139,7 +139,7 @@ def mesh_folder(tmp_path: Path) -> Path:
     [
         ("missing.stl", ("file not found",)),
         ("noise.stl", ("noise.stl",)),
-        ("empty.ply", ("can", "not", "read")),
+        ("empty.ply", ("damaged", "PLY")),
         ("open.stl", ("closed surface",)),
         ("millimetres.stl", ("millimetres?",)),
         ("tiny.stl", ("twice?",)),

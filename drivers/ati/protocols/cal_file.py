@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -109,11 +110,18 @@ def load(path: Path) -> AtiCalibration:
             return _daq_sensor(root)
         if root.tag == "dsNetFTCalibrationFile":
             return _net_box(root)
-    except (KeyError, ValueError) as error:
-        raise ConfigurationError(f"calibration is incomplete or damaged ({error})", where=str(path)) from error
+    except KeyError as error:
+        raise _damaged(f"{error.args[0]} is missing", path) from error
+    except ValueError as error:
+        raise _damaged(str(error), path) from error
     raise ConfigurationError(
         f"is not an ATI calibration (root element {root.tag})", where=str(path), hint="Give a .cal or Net F/T XML file"
     )
+
+
+def _damaged(reason: str, path: Path) -> ConfigurationError:
+    what = f"calibration is incomplete or damaged ({reason})"
+    return ConfigurationError(what, where=str(path), hint="Take the file that came with the sensor")
 
 
 def _parse(path: Path) -> ET.Element:
@@ -220,7 +228,7 @@ def _check_units(force_unit: str, torque_unit: str) -> None:
 
 def _child(parent: ET.Element, tag: str) -> ET.Element:
     if (child := parent.find(tag)) is None:
-        raise KeyError(f"no element {tag}")
+        raise KeyError(tag)
     return child
 
 
@@ -229,9 +237,10 @@ def _text(parent: ET.Element, tag: str) -> str:
 
 
 def _number(text: str) -> float:
-    if not math.isfinite(value := float(text)):
-        raise ValueError(f"{text!r} is not a finite number")
-    return value
+    with suppress(ValueError):
+        if math.isfinite(value := float(text)):
+            return value
+    raise ValueError(f"{text!r} is not a finite number")
 
 
 def _numbers(text: str, count: int) -> Array:

@@ -8,10 +8,18 @@ from typing import Any
 
 import trimesh
 
+from drivers.core.errors import ConfigurationError
 from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, read_bounded
 
 FORMATS = (".ply", ".stl", ".obj", ".glb", ".gltf", ".off", ".3mf")
 """Other formats of trimesh, archives and drawings among them, take minutes for what a few kilobytes say."""
+
+
+_FORMATS_HINT = "Give a PLY, STL, OBJ or GLB file"
+
+
+class _ElsewhereError(Exception):
+    """A mesh names a file in another folder; not a ValueError, which readers take for a file that is not there."""
 
 
 class _Beside(trimesh.resolvers.Resolver):
@@ -25,9 +33,9 @@ class _Beside(trimesh.resolvers.Resolver):
         self._folder = folder
 
     def get(self, name: str) -> bytes:
-        """The content of a file. Raises OSError, ConfigurationError, ValueError for one elsewhere."""
+        """The content of a file. Raises OSError, ConfigurationError, _ElsewhereError for one in another folder."""
         if not (path := (self._folder / name).resolve()).is_relative_to(self._folder.resolve()):
-            raise ValueError(f"{name!r} is in another folder")
+            raise _ElsewhereError(f"names {name!r}, which is in another folder")
         return read_bounded(path, LARGEST_MESH_bytes)
 
     def write(self, name: str, data: Any) -> None:
@@ -51,13 +59,24 @@ def load_foreign_mesh(path: Path, **options: Any) -> Any:
         options: of :func:`trimesh.load`.
 
     Raises:
-        OSError: it cannot be read.
-        ConfigurationError: it is too large, or a pipe or device.
-        ValueError: it is of another format.
-        Exception: each format's reader fails in its own way on bytes that do not follow it.
+        ConfigurationError: it cannot be read, is too large, a pipe or device, of another format, or damaged.
     """
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
-        raise ValueError(f"{suffix or 'no suffix'} is no format of meshes")
-    content = io.BytesIO(read_bounded(path, LARGEST_MESH_bytes))
-    return trimesh.load(content, file_type=suffix[1:], resolver=_Beside(path.parent), **options)
+        what = f"is not a mesh that can be read: {suffix or 'a name without a suffix'} is none of its formats"
+        raise ConfigurationError(what, where=str(path), hint=_FORMATS_HINT)
+    try:
+        content = io.BytesIO(read_bounded(path, LARGEST_MESH_bytes))
+    except OSError as error:
+        raise ConfigurationError(
+            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
+        ) from error
+    try:
+        return trimesh.load(content, file_type=suffix[1:], resolver=_Beside(path.parent), **options)
+    except _ElsewhereError as error:
+        raise ConfigurationError(str(error), where=str(path), hint="Put what it names beside it") from error
+    except ConfigurationError:  # of a file beside it
+        raise
+    except Exception as error:  # each format's reader fails in its own way, and words, on bytes that do not follow it
+        what = f"is damaged, or not a {suffix[1:].upper()} file"
+        raise ConfigurationError(what, where=str(path), hint="Export the mesh again") from error

@@ -150,6 +150,10 @@ def run(
     session can be read.
     """
     from drivers.simulation.object_names import STANDING, in_pose
+
+    if pose != STANDING:
+        object_name = in_pose(object_name, pose)
+    _refuse_unusable_mesh(object_name)
     from tactile_lab.cli.running.approval import TerminalApproval
     from tactile_lab.cli.running.attending import GuidedWay, attendance
     from tactile_lab.cli.running.progress import LiveProgress
@@ -157,8 +161,6 @@ def run(
     from tactile_lab.cli.sessions.tables import tell_left_open
     from tactile_lab.workflow.running import SessionRequest, check_request, run_session
 
-    if pose != STANDING:
-        object_name = in_pose(object_name, pose)
     guided = mode is Mode.GUIDED
     if confirm and (no_input or guided):
         raise typer.BadParameter("needs an autonomous session", param_hint="'--confirm'")
@@ -189,6 +191,20 @@ def run(
     ):
         finished = run_session(request, progress, replace(present, approve=TerminalApproval()) if confirm else present)
     conclude(finished, as_json)
+
+
+def _refuse_unusable_mesh(object_name: str) -> None:
+    """Tell what is wrong with a mesh before all else is loaded, which takes longer than to read it twice.
+
+    Raises:
+        ConfigurationError: it is none, or cannot be used.
+    """
+    from drivers.simulation.object_names import MESH_PREFIX, posed_path
+
+    if object_name.startswith(MESH_PREFIX):
+        from drivers.simulation.mesh_file import read_mesh
+
+        read_mesh(posed_path(object_name)[0])
 
 
 def _refuse_guided_options(given: Mapping[str, bool]) -> None:

@@ -152,12 +152,6 @@ def _load(path: Path) -> trimesh.Trimesh:
         return mesh
     except ConfigurationError as error:
         raise ShapeError(error.what, where=str(path), hint=error.hint) from error
-    except Exception as error:  # each format's reader fails in its own way on foreign bytes
-        raise ShapeError(
-            f"cannot be read as a mesh ({type(error).__name__}: {error})",
-            where=str(path),
-            hint="Supported formats are PLY, STL, OBJ and GLB",
-        ) from error
 
 
 def _open_edge_count(mesh: trimesh.Trimesh) -> int:

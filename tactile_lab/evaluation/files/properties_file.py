@@ -55,7 +55,7 @@ def read_mass(results: Path) -> Value | None:
     try:
         return None if mass is None else Value(float(mass["value"]), float(mass["sigma"]))
     except (KeyError, TypeError, ValueError) as error:
-        raise SessionError(f"no mass can be read ({error!r})", where=str(file), hint=hint) from error
+        raise SessionError("mass_kg needs a finite value and sigma", where=str(file), hint=hint) from error
 
 
 def _centre(properties: ObjectProperties, world_T_object: Sequence[Pose3 | None]) -> dict[str, Any] | None:

@@ -137,7 +137,7 @@ def read_contour(path: Path) -> ContourRows:
     try:
         table = np.array([[float(entry) for entry in row] for row in rows[:-1]])
     except ValueError as error:
-        raise SessionDataError(f"has an entry that is not a number ({error})", where=str(path), hint=RERUN) from error
+        raise SessionDataError("has an entry that is not a number", where=str(path), hint=RERUN) from error
     if len(table) < _LEAST_CORNERS or not np.isfinite(table).all():
         raise SessionDataError("is not an outline of three finite points or more", where=str(path), hint=RERUN)
     known = table[:, 3] != 0 if table.shape[1] > 3 else np.ones(len(table), dtype=bool)

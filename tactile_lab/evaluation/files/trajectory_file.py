@@ -93,7 +93,7 @@ def _read_row(row: list[str], count: int, where: str) -> tuple[float, Pose3 | No
         matrix = np.array([float(entry) for entry in row[_MATRIX]]).reshape(4, 4)
         upper = [float(entry) for entry in row[len(COLUMNS) :]] if any(row[len(COLUMNS) :]) else None
     except ValueError as error:
-        raise SessionDataError(f"contains an entry that is not a number ({error})", where=where) from error
+        raise SessionDataError("contains an entry that is not a number", where=where) from error
     return stamp, _rigid(matrix, where), None if upper is None else _covariance(upper, where)
 
 

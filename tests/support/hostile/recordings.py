@@ -149,7 +149,7 @@ def _archives() -> dict[str, Content]:
     return {
         "noise": _NOISE,
         "300 MB of zeros, packed": lambda path: _zipped(path, {"s/traffic.mcap": 300 * MB}),
-        "300 files of 1 MB of zeros": lambda path: _zipped(path, {f"s/results/{n}": MB for n in range(300)}),
+        "500 files of 1 MB of zeros": lambda path: _zipped(path, {f"s/results/{n}": MB for n in range(500)}),
         "20 000 files": lambda path: _zipped(path, {f"s/{n}": 1 for n in range(20_000)}),
         "names that leave the folder": lambda path: _zipped(path, {"s/../../../tmp/x": 10, "s/session.yaml": 10}),
         "an absolute name": lambda path: _zipped(path, {"/tmp/x": 10}),

@@ -143,7 +143,7 @@ def test_a_file_that_can_not_be_read_is_told(tmp_path):
     with pytest.raises(ConfigurationError, match="No such file"):
         read_timed_contacts(tmp_path / "none.csv")
     (tmp_path / "c.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ConfigurationError, match="is not a CSV table"):
+    with pytest.raises(ConfigurationError, match="is not a text file"):
         read_timed_contacts(tmp_path / "c.csv")
 
 

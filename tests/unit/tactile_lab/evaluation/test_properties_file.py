@@ -39,5 +39,5 @@ def test_one_that_never_hung_free_has_a_file_without_a_mass(tmp_path):
 
 def test_a_damaged_file_is_named(tmp_path):
     (tmp_path / PROPERTIES).write_text('{"mass_kg": {"value": "heavy"}}')
-    with pytest.raises(SessionError, match="no mass can be read"):
+    with pytest.raises(SessionError, match="mass_kg needs a finite value and sigma"):
         read_mass(tmp_path)

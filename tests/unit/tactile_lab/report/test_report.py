@@ -269,7 +269,7 @@ def test_torn_recording_still_tells_its_decisions(tmp_path: Path) -> None:
 
 
 def test_decision_of_another_form_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(SessionError, match="/decision has an unexpected format"):
+    with pytest.raises(SessionError, match="/decision does not have the form of its topic"):
         read_course(record(tmp_path, decisions=(decided(2, chosen=7),)))
 
 

@@ -98,7 +98,7 @@ def test_temperature_terms_are_read_where_the_file_has_them(tmp_path: Path) -> N
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><FTSensor/>", "document type"),
         ("<other/>", "not an ATI calibration"),
         ("<FTSensor", "not valid XML"),
-        ("<FTSensor Serial='1'/>", "no element Calibration"),
+        ("<FTSensor Serial='1'/>", "Calibration is missing"),
         (sensor_text().replace('"6"', '"nan"'), "finite"),
         (sensor_text().replace('DistUnits="mm"', 'DistUnits="furlong"'), "furlong"),
         (sensor_text(torque="ounce"), "ounce"),
