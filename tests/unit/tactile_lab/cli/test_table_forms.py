@@ -8,6 +8,7 @@ from collections import Counter
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rich.cells import cell_len
 from rich.console import Console
 
 from tactile_lab.cli import console
@@ -106,20 +107,21 @@ words = st.text("ab 漢[/]:…\n", max_size=30)
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
-    width=st.integers(20, 120),
+    width=st.integers(20, 200),
     terminal=st.booleans(),
     title=words,
     table=st.integers(1, 5).flatmap(
         lambda n: st.lists(st.lists(words, min_size=n, max_size=n), min_size=1, max_size=3)
     ),
 )
-def test_no_character_is_lost(width, terminal, title, table):
+def test_a_table_fits_its_terminal_and_no_character_is_lost(width, terminal, title, table):
     head, *rows = table
     with pytest.MonkeyPatch.context() as patched:
         lines = shown_by(patched.setattr, width, head, rows, terminal, title, ())
     told = Counter("".join(lines))
     expected = Counter("".join("".join(row) for row in rows) + title)
     assert not {character: count for character, count in (expected - told).items() if not character.isspace()}
+    assert not terminal or max(map(cell_len, lines)) <= width
 
 
 @pytest.mark.parametrize("terminal", [True, False])
