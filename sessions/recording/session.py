@@ -75,7 +75,10 @@ class Session:
             raise SessionDataError(f"no calibration called {role!r}", where=str(self.folder / MANIFEST))
         copy = self.manifest.calibration[role]
         path = self.folder / CALIBRATION / copy.file
-        hint = f"tactile-lab session recover {self.folder} takes it from the recording"
+        if (self.folder / TRAFFIC).is_file():
+            hint = f"tactile-lab session recover {self.folder} takes it from the recording"
+        else:
+            hint = f"{TRAFFIC}, which holds a copy, is missing too: restore both from a copy of the session"
         if sha256(read_calibration(path, hint)) != copy.sha256:
             raise SessionDataError("changed since the recording", where=str(path), hint=hint)
         return path

@@ -129,6 +129,16 @@ def test_calibrations_of_a_whole_session_come_back_from_its_recording(tmp_path, 
     assert not recovery.lossy
 
 
+def test_a_session_without_its_recording_promises_no_recovery(tmp_path):
+    joints = tmp_path / "joints.yaml"
+    joints.write_text("a: 1\n")
+    folder = record(tmp_path / "runs", calibration=joints)
+    (folder / "calibration" / "joints.yaml").unlink()
+    (folder / "traffic.mcap").unlink()
+    with pytest.raises(SessionError, match="restore both from a copy"):
+        Session.open(folder).calibration_file("joints")
+
+
 def test_several_files_are_recovered_as_one_recording(tmp_path):
     folder = record(tmp_path, segment_bytes=100_000, size=600)
     files = sorted(folder.glob("traffic*.mcap"))
