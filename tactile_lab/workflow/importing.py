@@ -33,6 +33,11 @@ def import_contacts(file: Path, log: Path, settings: ImportSettings, mesh: Path 
     if file.suffix.lower() in _OTHER_ARCHIVES:
         hint = "Unpack it: the folder of a session is used as it is"
         raise ConfigurationError("is an archive, but no ZIP", where=str(file), hint=hint)
+    if file.suffix.lower() == ".mcap":
+        hint = (
+            f"A session is used as it is: give its folder, such as {file.resolve().parent.name}, to replay or recover"
+        )
+        raise ConfigurationError("is a recording, not a table of contacts", where=str(file), hint=hint)
     if log.exists():
         raise ConfigurationError("exists already", where=str(log), hint="Choose another name with --out")
     if mesh is not None:

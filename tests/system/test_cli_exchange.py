@@ -279,6 +279,9 @@ def test_what_is_no_archive_or_a_torn_one_is_told(inside, packed, tmp_path):
     refused(inside("session", "import", tmp_path / "none.zip", "--root", tmp_path / "runs"), 2, "No such file")
     (tmp_path / "s.tar.gz").write_bytes(b"\x1f\x8b")
     refused(inside("session", "import", tmp_path / "s.tar.gz"), 2, "is an archive, but no ZIP", "Unpack it")
+    refused(
+        inside("session", "import", tmp_path / "mug" / "traffic.mcap"), 2, "is a recording", "its folder, such as mug"
+    )
     assert not (tmp_path / "runs").exists()
 
 
