@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping, Sequence
+import os
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -146,7 +147,7 @@ def _line(summary: SessionSummary) -> Line:
         session = Session.open(summary.folder)
     except SessionError:  # its problem stands in the summary
         return line
-    line |= _of_manifest(session.manifest) | dict(_figures(session))
+    line |= _of_manifest(session.manifest) | _figures(session)
     return {name: _typed(name, value) for name, value in line.items()}
 
 
@@ -200,10 +201,13 @@ def _duration_s(manifest: Manifest) -> float | None:
         return None
 
 
-def _figures(session: Session) -> Iterator[tuple[str, Any]]:
-    """What the evaluation of the session's own results says; nothing without one."""
+def _figures(session: Session) -> Line:
+    """What the evaluation of the session's own results says; nothing without one, and why if it cannot be read."""
+    path = session.folder / RESULTS / "evaluation.json"
+    if not os.path.lexists(path):
+        return {}
     try:
-        content = read_json_object(session.folder / RESULTS / "evaluation.json", hint="")
-    except SessionError:
-        return
-    yield from ((name, _inside(content, *keys)) for name, keys in _FIGURES.items())
+        content = read_json_object(path, hint=f"Make it anew: tactile-lab evaluate {session.folder}")
+    except SessionError as error:
+        return {"status": "damaged", "problem": str(error)}
+    return {name: _inside(content, *keys) for name, keys in _FIGURES.items()}

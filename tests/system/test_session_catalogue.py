@@ -23,10 +23,11 @@ def tactile_lab(*words: object) -> Result:
 
 def test_sessions_become_a_table_with_units_that_can_be_asked(recorded: Path, tmp_path: Path) -> None:
     root, table = tmp_path / "lab", tmp_path / "catalogue.parquet"
-    for name in ("one", "two", "damaged", "unevaluated"):
+    for name in ("one", "two", "damaged", "torn", "unevaluated"):
         shutil.copytree(recorded, root / name)
     (root / "damaged" / "session.yaml").write_text("name: [")
     (root / "two" / "results" / "evaluation.json").write_text('{"failed": "perhaps", "shape": 3, "contacts": 7}')
+    (root / "torn" / "results" / "evaluation.json").write_text("[" * 50_000)
     shutil.rmtree(root / "unevaluated" / "results")
     (root / "no-session").mkdir()
     answer = tactile_lab("session", "catalogue", root, "--out", table)
@@ -36,14 +37,16 @@ def test_sessions_become_a_table_with_units_that_can_be_asked(recorded: Path, tm
     assert found.column_names == list(UNITS)
     assert found.schema.field("pose_rmse_mm").metadata == {b"unit": b"mm"}
     lines = {Path(line["folder"]).name: line for line in found.to_pylist()}
-    assert set(lines) == {"one", "two", "damaged", "unevaluated"}
+    assert set(lines) == {"one", "two", "damaged", "torn", "unevaluated"}
     told = json.loads((recorded / "results" / "evaluation.json").read_text())
     assert lines["one"]["hausdorff_best_fit_mm"] == told["shape_best_fit"]["hausdorff_mm"]
     assert (lines["one"]["method"], lines["one"]["rig"], lines["one"]["fingertips"]) == ("joint", "sim", "nano17")
     assert lines["one"]["duration_s"] >= 0
     assert (lines["two"]["contacts"], lines["two"]["failed"], lines["two"]["hausdorff_mm"]) == (7, None, None)
     assert (lines["damaged"]["status"], lines["unevaluated"]["failed"]) == ("damaged", None)
-    assert found.filter(compute.field("status") == "damaged").num_rows == 1
+    assert found.filter(compute.field("status") == "damaged").num_rows == 2
+    assert "evaluation.json: is not readable JSON" in lines["torn"]["problem"]
+    assert "evaluation.json: is not readable JSON" in answer.stderr
 
 
 def test_a_catalogue_as_csv_and_json_and_on_the_screen(recorded: Path, tmp_path: Path) -> None:
