@@ -10,6 +10,10 @@ READY  := $(VENV)/ready
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
+# Tests start the program a hundred times, and three workers read every test: what is compiled is kept, even where the
+# surroundings say otherwise.
+export PYTHONDONTWRITEBYTECODE :=
+
 .PHONY: help demo test suite test-long check bench results experiments coverage docs lock clean mutants
 
 help:  ## This list

@@ -5,6 +5,7 @@ Contact forces follow from penetration: 500 N/m. A held disc moves with the palm
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -174,7 +175,9 @@ class DiscWorld:
     # --- contact ------------------------------------------------------------------------------------------
 
     def _tip_m(self, finger: str) -> Array:
-        return np.asarray(self.perception.world_T_distal[finger].transformFrom(TIP_CENTRE_m))
+        # Asked for at every cycle: the perception's own way makes the poses of all five fingers for each of them.
+        frame = self.perception._placement.current().world_T_distal[FINGERS.index(finger)]
+        return np.asarray(frame[:3, :3] @ TIP_CENTRE_m + frame[:3, 3])
 
     def outward(self, finger: str) -> Array:
         """Direction out of the disc toward a tip, world frame, shape (3,)."""
@@ -195,7 +198,7 @@ class DiscWorld:
         """Penetration of a tip into the disc: from the side, and from the top."""
         assert self.disc is not None
         tip_m = self._tip_m(finger)
-        aside_m = self.disc.radius_m + TIP_RADIUS_m - float(np.linalg.norm(tip_m[:2] - self.disc.centre_m))
+        aside_m = self.disc.radius_m + TIP_RADIUS_m - math.dist(tip_m[:2], self.disc.centre_m)
         return aside_m, self.disc.height_m + TIP_RADIUS_m - float(tip_m[2])
 
     # --- session events
