@@ -14,6 +14,7 @@ from drivers.core.poses import rotate, spatial, transform_points
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 
+GRASPS = 5
 SIZE_m = (0.10, 0.06, 0.04)
 PERIOD_ns = 20_000_000_000
 
@@ -26,14 +27,14 @@ class Recorded:
     truth: tuple[Pose3, ...]
 
 
-def box_grasps(count: int, seed: int = 0, motion_noise: float = 0.2) -> Recorded:
-    """Grasps whose hand motion is known to ``motion_noise`` times 10 mm and 20 degrees."""
-    rng = np.random.default_rng(seed)
+def box_grasps() -> Recorded:
+    """A session of :data:`GRASPS` grasps whose hand motion is known to 1 mm and 2 degrees."""
+    rng = np.random.default_rng(1)
     truth, grasps, pose = [], [], Pose2(0.40, 0.05, 0.3)
-    for index in range(count):
+    for index in range(GRASPS):
         motion = Pose2(*(rng.normal(size=3) * [0.03, 0.03, 0.4])) if index else Pose2()
         previous, pose = pose, Pose2(pose.x() + motion.x(), pose.y() + motion.y(), pose.theta() + motion.theta())
-        slip = Pose2(*(rng.normal(size=3) * [0.010, 0.010, 0.35] * motion_noise)) if index else Pose2()
+        slip = Pose2(*(rng.normal(size=3) * [0.001, 0.001, 0.035])) if index else Pose2()
         hand_motion = pose.compose(slip).compose(previous.inverse())
         truth.append(spatial(pose, SIZE_m[2] / 2))
         grasps.append(_grasp(index, truth[-1], spatial(hand_motion), rng))
@@ -41,10 +42,10 @@ def box_grasps(count: int, seed: int = 0, motion_noise: float = 0.2) -> Recorded
 
 
 @cache
-def result_of(dimension: Literal[2, 3], *, count: int = 5, seed: int = 1, motion_noise: float = 0.1) -> SlamResult:
+def result_of(dimension: Literal[2, 3]) -> SlamResult:
     """The default method's result for :func:`box_grasps`, computed once for all tests."""
-    slam = TactileSlam(SlamSettings(dimension=dimension), seed=3)
-    for grasp in box_grasps(count, seed, motion_noise).grasps:
+    slam = TactileSlam(SlamSettings(dimension=dimension, mesh_resolution_m=0.006), seed=3)
+    for grasp in box_grasps().grasps:
         slam.step(grasp)
     return slam.finish()
 

@@ -152,7 +152,7 @@ def test_help_may_be_read_in_part():
     [
         {"HOME": "/nonexistent"},
         {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
-        {"TMPDIR": "/nonexistent"},
+        pytest.param({"TMPDIR": "/nonexistent"}, marks=pytest.mark.long),
     ],
 )
 def test_a_bare_environment_changes_nothing(changed, recorded, tmp_path):

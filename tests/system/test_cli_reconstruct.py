@@ -363,7 +363,10 @@ def test_grasps_of_two_contacts_only_are_lost(inside, planar_log, tmp_path):
     assert "the object is lost: 6 of 6 grasps could not be registered" in document["warnings"]
 
 
-@pytest.mark.parametrize("method", ["joint", "particle", "thesis-pf", "icp"])
+@pytest.mark.parametrize(
+    "method",
+    [pytest.param("joint", marks=pytest.mark.long), "particle", "thesis-pf", "icp"],  # joint: test_tactile_slam
+)
 def test_a_jump_of_ten_centimetres_is_not_built_into_the_shape(inside, planar_log, tmp_path, method):
     def jump(index: int, contact: dict) -> None:
         if index >= 3:

@@ -39,7 +39,7 @@ def on_terminal(width: int, *words: str, **more: str) -> tuple[int, str]:
     return child.exitstatus, child.before
 
 
-@pytest.mark.parametrize("width", [60, 200])
+@pytest.mark.parametrize("width", [60, pytest.param(200, marks=pytest.mark.long)])
 def test_a_table_fits_its_terminal_and_loses_nothing(width):
     code, shown = on_terminal(width, "rig", "list")
     lines = [ESCAPE.sub("", line).rstrip() for line in shown.splitlines()]

@@ -122,6 +122,7 @@ def test_a_fault_of_the_hand_takes_its_demands_and_is_told_by_name(
     assert not found.reason or found.late_cycles <= 2
 
 
+@pytest.mark.long  # quicker: a hand that dies, in test_hand_process.py
 def test_a_hand_process_that_dies_ends_the_session_in_order(
     rig: Rig, laboratory: WiredLaboratory, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -21,7 +21,7 @@ from tests.support.print_scale_table import MOUNT_T_CAMERA
 from tests.support.stream_table import TARGET_Hz, simulated_streams
 
 
-@pytest.mark.parametrize(("delay_s", "stamped"), [(0.043, True), (-1.7, False)])
+@pytest.mark.parametrize(("delay_s", "stamped"), [(0.043, True), pytest.param(-1.7, False, marks=pytest.mark.long)])
 def test_region_and_delay_are_honest(delay_s: float, stamped: bool) -> None:
     solutions = [StreamProblem(simulated_streams(seed, delay_s, stamped=stamped)).solve() for seed in (1, 2, 3)]
     assert sum(region_holds(solution, MOUNT_T_CAMERA.inverse()) for solution in solutions) >= 2

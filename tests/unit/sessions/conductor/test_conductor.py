@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -12,13 +12,29 @@ from drivers.core.contacts import Grasp
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.decisions import AutonomousDecisions, Veto
 from sessions.conductor.estimator import Reorientation
-from sessions.conductor.session_outcome import Ending
+from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.recording.session_events import EventKind
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tests.support.disc_sessions import Watcher, disc, run, settings
 from tests.support.disc_world import DiscWorld
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A session of two grasps that has ended."""
+
+    outcome: SessionOutcome
+    world: DiscWorld
+    watcher: Watcher
+
+
+@pytest.fixture(scope="module")
+def two_grasps() -> Watched:
+    """One session that several tests look at."""
+    world, watcher = DiscWorld(disc()), Watcher()
+    return Watched(run(world, grasps=2, watcher=watcher), world, watcher)
 
 
 def test_session_runs_to_its_end_and_touches_with_most_fingers() -> None:
@@ -37,21 +53,21 @@ def test_contacts_lie_on_the_disc() -> None:
         assert np.linalg.norm(contact.point_world_m[:2] - target.centre_m) == pytest.approx(0.033, abs=0.003)
 
 
-def test_marks_come_in_the_order_of_the_cycle() -> None:
-    world = DiscWorld(disc())
-    run(world, grasps=2)
+def test_marks_come_in_the_order_of_the_cycle(two_grasps: Watched) -> None:
     carried = [EventKind.HOLD_BEGIN, EventKind.HOLD_END]
     closed = [EventKind.TARE, EventKind.CLOSE_BEGIN]
     measured = [*closed, EventKind.CAPTURE_BEGIN, EventKind.CAPTURE_END, EventKind.TRUTH_FRAME]
-    assert world.session_events == [*measured, *carried, *measured]  # nothing is carried after the last grasp
+    assert two_grasps.world.session_events == [
+        *measured,
+        *carried,
+        *measured,
+    ]  # nothing is carried after the last grasp
 
 
-def test_verbs_come_in_the_order_of_the_cycle() -> None:
-    watcher = Watcher()
-    run(DiscWorld(disc()), grasps=2, watcher=watcher)
+def test_verbs_come_in_the_order_of_the_cycle(two_grasps: Watched) -> None:
     first = ["descend", "close", "capture", "squeeze", "re-orient", "release", "lift", "estimate"]
-    assert watcher.phases[:8] == first
-    assert watcher.phases[8:] == ["descend", "close", "capture", "release", "lift", "estimate"]
+    assert two_grasps.watcher.phases[:8] == first
+    assert two_grasps.watcher.phases[8:] == ["descend", "close", "capture", "release", "lift", "estimate"]
 
 
 def test_an_object_that_is_to_stay_is_let_go_where_it_is() -> None:
@@ -64,13 +80,11 @@ def test_an_object_that_is_to_stay_is_let_go_where_it_is() -> None:
     assert outcome.grasps[1].hand_motion_world.equals(Pose3(), 1e-12)
 
 
-def test_hand_motion_carries_the_object_and_goes_into_the_next_grasp() -> None:
-    target = disc()
-    start_m = target.centre_m.copy()
-    outcome = run(DiscWorld(target), grasps=2)
-    motion = outcome.grasps[1].hand_motion_world
-    moved_m = np.asarray(motion.transformFrom(np.array([*start_m, 0.0])))[:2]
-    np.testing.assert_allclose(moved_m, target.centre_m, atol=2e-3)
+def test_hand_motion_carries_the_object_and_goes_into_the_next_grasp(two_grasps: Watched) -> None:
+    motion = two_grasps.outcome.grasps[1].hand_motion_world
+    moved_m = np.asarray(motion.transformFrom(np.array([*disc().centre_m, 0.0])))[:2]
+    assert two_grasps.world.disc is not None
+    np.testing.assert_allclose(moved_m, two_grasps.world.disc.centre_m, atol=2e-3)
     assert 0.2 < abs(motion.rotation().yaw()) < 0.8
 
 
@@ -96,9 +110,8 @@ def test_object_is_brought_back_toward_the_middle() -> None:
     assert np.linalg.norm(target.centre_m) < 0.02
 
 
-def test_report_tells_contacts_forces_and_uncertainty() -> None:
-    watcher = Watcher()
-    run(DiscWorld(disc()), grasps=2, watcher=watcher)
+def test_report_tells_contacts_forces_and_uncertainty(two_grasps: Watched) -> None:
+    watcher = two_grasps.watcher
     assert [report.number for report in watcher.reports] == [1, 2]
     report = watcher.reports[0]
     assert report.planned == 2
@@ -111,8 +124,8 @@ def test_report_tells_contacts_forces_and_uncertainty() -> None:
     assert 0.0 <= report.explored <= 1.0
 
 
-def test_same_seed_same_session() -> None:
-    first, second = (run(DiscWorld(disc()), grasps=2).grasps for _ in range(2))
+def test_same_seed_same_session(two_grasps: Watched) -> None:
+    first, second = two_grasps.outcome.grasps, run(DiscWorld(disc()), grasps=2).grasps
     np.testing.assert_array_equal(first[1].points_world_m, second[1].points_world_m)
 
 

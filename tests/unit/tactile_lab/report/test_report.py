@@ -29,9 +29,8 @@ from tactile_lab.report.course import Course, Stop, read_course
 from tactile_lab.report.listings import decisions_card, stops_card
 from tactile_lab.report.rendering import VIEWS, render
 from tactile_lab.report.svg import Chart, Frame, Scale, tick_label
-from tests.support.synthetic_grasps import SIZE_m, box_grasps, result_of
+from tests.support.synthetic_grasps import GRASPS, SIZE_m, box_grasps, result_of
 
-GRASPS = 5
 VOID = {"meta", "img", "input", "circle", "path", "line", "rect"}
 NASTY = "Table <b>3</b> & \"north\" </script><script>alert('x')</script>"
 
@@ -67,7 +66,7 @@ class Page(HTMLParser):
 
 
 def make_session(root: Path, dimension: Literal[2, 3], *, with_truth: bool = True) -> Path:
-    recorded = box_grasps(GRASPS, seed=1, motion_noise=0.1)
+    recorded = box_grasps()
     mesh = trimesh.creation.box(SIZE_m)
     session = create_session(
         root,
@@ -82,7 +81,7 @@ def make_session(root: Path, dimension: Literal[2, 3], *, with_truth: bool = Tru
     )
     session.close(counts={"grasps": GRASPS})
     settings = {"method": "joint", "back_end": {"limits": [1, 2]}}
-    write_results(session.results, result_of(dimension, count=GRASPS), recorded.grasps, settings)
+    write_results(session.results, result_of(dimension), recorded.grasps, settings)
     if with_truth:
         stamps = (0.0,) * GRASPS
         text = trajectory_text(Trajectory(stamps, recorded.truth))

@@ -15,7 +15,7 @@ from tests.support.simulated_contacts import registration_mm
 @pytest.mark.parametrize("shape", ["rectangle", pytest.param("hexagon", marks=pytest.mark.long)])
 def test_an_object_that_was_carried_off_is_found_again(shape: str) -> None:
     jump = Pose3(Rot3.Rz(1.0), np.array([0.1, 0.02, 0.0]))
-    data = carried_off(planar_data.simulate(shape, 2, count=12), 8, jump)
+    data = carried_off(planar_data.simulate(shape, 2, count=9), 6, jump)
     slam = TactileSlam(SlamSettings.model_validate({"joint": {"backwards": False}}), 0)
     for grasp in data.grasps:
         slam.add_grasp(grasp)

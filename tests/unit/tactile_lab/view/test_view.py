@@ -388,7 +388,7 @@ def test_killed_page_costs_messages_and_nothing_else() -> None:
     assert not alive(pid)
 
 
-@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("way", [signal.SIGKILL, pytest.param(signal.SIGSTOP, marks=pytest.mark.long)])
 def test_recording_is_whole_when_its_page_is_killed_or_hangs(tmp_path: Path, way: signal.Signals) -> None:
     session = create_session(tmp_path, rig="sim", rig_description={}, object_name="box")
     with session, ViewFeed("127.0.0.1", 0, "", "test") as feed:

@@ -18,13 +18,13 @@ METHODS = ("joint", "particle", "thesis-pf", "thesis-pf-graph", "odometry", "icp
 QUICK = "particles: 100\ncontour_resolution_m: 0.004\nmesh_resolution_m: 0.012\n"
 
 
-@settings(max_examples=12, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(document=logs(), method=st.sampled_from(METHODS), gate=st.sampled_from(["", "gate: {least_contacts: 0}\n"]))
 def test_any_log_that_fits_the_form_ends_in_a_result_or_in_words(document, method, gate):
     _reconstruct(document, method, gate)
 
 
-@settings(max_examples=20, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=14, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(document=damaged_logs(), method=st.sampled_from(METHODS))
 def test_a_log_that_is_damaged_anywhere_ends_in_a_result_or_in_words(document, method):
     _reconstruct(document, method, "")

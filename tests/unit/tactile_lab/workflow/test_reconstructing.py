@@ -163,7 +163,7 @@ def inward(data: PlanarGrasps) -> tuple[Grasp, ...]:
     )
 
 
-@pytest.mark.parametrize("method", ["joint", "particle"])
+@pytest.mark.parametrize("method", [pytest.param("joint", marks=pytest.mark.long), "particle"])
 def test_inward_normals_that_reach_the_estimation_give_no_certain_shape(method: str) -> None:
     result = taken(inward(DATA), method=method, particles=2000)
     assert result.status == "lost" or largest_sigma_m(result) > 0.005

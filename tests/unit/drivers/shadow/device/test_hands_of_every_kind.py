@@ -27,7 +27,7 @@ def test_every_motor_that_a_hand_has_moves_its_own_joint(tmp_path: Path, kind: H
     assert all(finding.ok for finding in findings)
 
 
-@pytest.mark.parametrize("palm", ["0230", "0240", "0250"])
+@pytest.mark.parametrize("palm", ["0230", *(pytest.param(palm, marks=pytest.mark.long) for palm in ("0240", "0250"))])
 def test_other_palms_drive_the_same_motors(tmp_path: Path, palm: str) -> None:
     kind = HandFolder(LITE.name, LITE.numbers, palm=palm, backwards=("FFJ3", "THJ4"))  # type: ignore[arg-type]
     assert all(finding.ok for finding in EmulatedBench(setup_of(write_folder(tmp_path, kind))).moves())

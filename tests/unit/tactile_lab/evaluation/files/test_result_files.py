@@ -36,12 +36,12 @@ def run_slam(recorded: Recorded, dimension: int) -> SlamResult:
 
 @pytest.fixture(scope="module")
 def recorded() -> Recorded:
-    return box_grasps(5)
+    return box_grasps()
 
 
 @pytest.fixture(scope="module", params=[2, 3])
 def result(request: pytest.FixtureRequest) -> SlamResult:
-    return result_of(request.param, seed=0, motion_noise=0.2)
+    return result_of(request.param)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -95,7 +95,7 @@ def test_results_read_back(tmp_path: Path, result: SlamResult, recorded: Recorde
 
 
 def test_planar_session_ends_with_its_contour_stood_upright(tmp_path: Path, recorded: Recorded) -> None:
-    result = result_of(2, seed=0, motion_noise=0.2)
+    result = result_of(2)
     write_results(tmp_path, result, recorded.grasps)
     contour = read_contour(tmp_path / "contour.csv").points_m
     assert signed_area_m2(contour) > 0  # counter-clockwise
@@ -109,7 +109,7 @@ def test_planar_session_ends_with_its_contour_stood_upright(tmp_path: Path, reco
 
 
 def test_steps_are_told_without_durations(tmp_path: Path, recorded: Recorded) -> None:
-    write_results(tmp_path, result_of(2, seed=0, motion_noise=0.2), recorded.grasps)
+    write_results(tmp_path, result_of(2), recorded.grasps)
     steps = json.loads((tmp_path / "slam.json").read_text())["steps"]
     assert [step["index"] for step in steps] == list(range(5))
     assert not any("seconds" in step for step in steps)
@@ -118,7 +118,7 @@ def test_steps_are_told_without_durations(tmp_path: Path, recorded: Recorded) ->
 def test_folder_that_can_not_be_made_is_named(tmp_path: Path, result: SlamResult) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(WriteError, match="cannot be written"):
-        write_results(tmp_path / "file" / "results", result, box_grasps(5).grasps)
+        write_results(tmp_path / "file" / "results", result, box_grasps().grasps)
 
 
 def break_contacts(folder: Path) -> None:
@@ -146,7 +146,7 @@ def remove_timing(folder: Path) -> None:
 def test_damaged_results_are_session_errors_with_a_hint(
     tmp_path: Path, recorded: Recorded, damage: Callable[[Path], None]
 ) -> None:
-    write_results(tmp_path, result_of(2, seed=0, motion_noise=0.2), recorded.grasps)
+    write_results(tmp_path, result_of(2), recorded.grasps)
     damage(tmp_path)
     with pytest.raises(SessionError, match="Replay"):
         read_results(tmp_path)

@@ -100,7 +100,7 @@ def moving_object(seed: int) -> MovingObject:
 
 
 def test_a_moving_object_is_followed_from_where_it_was_known_to_be() -> None:
-    found = [moving_object(seed) for seed in (5, 6, 7)]
+    found = [moving_object(seed) for seed in (5, 6)]
     assert min(float(np.hypot(one.truth[-1].x(), one.truth[-1].y())) for one in found) > 0.005
     errors = [planar(one.truth[-1]).range(one.world_T_body.translation()) for one in found]
     assert max(errors) < 0.004

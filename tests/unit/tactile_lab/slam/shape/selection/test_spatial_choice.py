@@ -44,7 +44,7 @@ def test_flat_faces_are_chosen_for_blocks(mesh: trimesh.Trimesh) -> None:
 
 
 def test_a_prism_with_a_round_outline_is_chosen_for_a_cylinder() -> None:
-    shape = best_shape(field_on(cylinder_mesh(), 100, seed=0), floor_m=0.0)
+    shape = best_shape(field_on(cylinder_mesh(), 80, seed=0), floor_m=0.0)
     assert shape.name == "prism"
     surface = shape.mesh(floor_m=0.0)
     assert closed(surface)
@@ -53,7 +53,7 @@ def test_a_prism_with_a_round_outline_is_chosen_for_a_cylinder() -> None:
 
 
 def test_the_field_is_chosen_for_an_ellipsoid_and_is_not_widened_at_the_table() -> None:
-    field = field_on(ellipsoid_mesh(), 100, seed=0)
+    field = field_on(ellipsoid_mesh(), 70, seed=0)
     shape = best_shape(field, floor_m=0.0)
     assert shape.name == "standing gpis"
     alone = mesh_errors(extract_mesh(field, floor_m=0.0), ellipsoid_mesh())
@@ -95,7 +95,7 @@ def test_a_sharp_solid_that_fills_free_places_is_not_taken() -> None:
 
 
 def test_walls_of_a_standing_field_reach_the_table_and_a_level_top_has_a_sharp_rim() -> None:
-    field = field_on(cylinder_mesh(), 120, seed=1)
+    field = field_on(cylinder_mesh(), 80, seed=1)
     standing = StandingField.fit(field, 0.0)
     assert standing.ceiling_m == pytest.approx(0.09, abs=0.001)
     assert standing.log_evidence > field.log_marginal_likelihood()

@@ -114,6 +114,7 @@ def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: Cont
     assert abs(gap[2]) < 0.15
 
 
+@pytest.mark.long  # quicker: a single grasp on wrong faces, above
 def test_grasps_that_took_a_wrong_turn_together_are_turned_back_together() -> None:
     """A third of a turn of a prism with three equal sides: only the motion tells, and only at both ends of the run."""
     prism = true_map("triangular-prism", count=COUNT, dimension=3)

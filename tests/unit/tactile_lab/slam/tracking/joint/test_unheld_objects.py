@@ -22,7 +22,7 @@ MOTION = {"translation_m": 0.007, "rotation_rad": 0.21, "unheld": 0.15}
 PUSHED_AT = 3
 
 
-@pytest.mark.parametrize("turn_deg", [0.0, 13.0, pytest.param(-18.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize("turn_deg", [13.0, *(pytest.param(turn, marks=pytest.mark.long) for turn in (0.0, -18.0))])
 def test_an_object_that_a_closing_hand_turned_is_followed(turn_deg: float) -> None:
     """Nothing carries it; it lies still but for one grasp, in which the fingers turn it."""
     hand = PlanarHand(OUTLINES_m["rectangle"], np.random.default_rng(4))
