@@ -32,6 +32,7 @@ CYCLE_s = 0.005
 WATCHDOG_s = 0.1
 _CALIBRATION = JointCalibration.load(Path(rigs.__file__).parent / "calibrations" / "simulated-hand" / "joints.yaml")
 _FFJ3, _CHANNEL = 1, 2  # the motor of FFJ3 and the channel of its sensor
+_MOVING_PWM = SensorLimits().frozen_share * HandSettings().gains.of("FFJ3").max_pwm  # less may move nothing
 _WARM_UP, _MOVED_rad = 120, 1e-3
 _LASTS_s = 3.5
 
@@ -69,7 +70,7 @@ class DrivenHand:
 
     def _note(self, payload: bytes) -> None:
         self.demands = np.array(PALMS["0220"].decode_command(payload).motor_data)
-        if abs(self.demands[_FFJ3]) < SensorLimits().frozen_share * HandSettings().gains.of("FFJ3").max_pwm:
+        if abs(self.demands[_FFJ3]) < _MOVING_PWM:
             self._eased_ns = self.clock.now_ns()
         self._send(payload)
 

@@ -130,6 +130,7 @@ _FLAG_WORDS = {
     MotorFlag.EEPROM_CRC_BAD: "halted, stored configuration damaged",
     MotorFlag.OVER_TEMPERATURE: "halted, over temperature",
 }
+_BIT_WORDS = tuple((int(flag), words) for flag, words in _FLAG_WORDS.items())  # plain numbers: asked at every cycle
 
 
 def describe_flags(flags: int) -> tuple[str, ...]:
@@ -137,7 +138,7 @@ def describe_flags(flags: int) -> tuple[str, ...]:
 
     The current choke and bits without a published meaning are left out.
     """
-    return tuple(words for flag, words in _FLAG_WORDS.items() if flags & flag)
+    return tuple(words for bit, words in _BIT_WORDS if flags & bit)
 
 
 def as_signed(misc: NDArray[np.uint16]) -> NDArray[np.int16]:
