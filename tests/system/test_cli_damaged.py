@@ -212,4 +212,4 @@ def test_results_that_are_nested_too_deeply_hide_no_others(inside, session_copy,
         (session_copy / "results" / name).write_text(100_000 * "[")
     assert inside("session", "catalogue", tmp_path, "--out", tmp_path / "all.csv").code == 0
     assert len((tmp_path / "all.csv").read_text().splitlines()) == 2
-    assert "slam.json" in inside("session", "replay", session_copy, "--method", "odometry").err
+    assert "slam.json" in inside("session", "replay", session_copy).err

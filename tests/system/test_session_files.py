@@ -30,7 +30,7 @@ def session(recorded):
 def first_grasp(session, tmp_path_factory):
     """The session up to its first picture."""
     folder = tmp_path_factory.mktemp("piece") / "first-grasp"
-    extract(session, folder, Piece(to_s=16.0))
+    extract(session, folder, Piece(to_s=9.0))
     return Session.open(folder)
 
 
