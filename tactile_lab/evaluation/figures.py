@@ -80,10 +80,17 @@ class SensingFigures:
 
 @dataclass(frozen=True)
 class UncertaintyFigures:
-    """The estimated uncertainty: the standard deviation of the contour or surface, over all its points."""
+    """The estimated uncertainty: the standard deviation of the contour or surface, over all its points.
+
+    Attributes:
+        sigma_mm_median, sigma_mm_p95: of all errors together.
+        shared_sigma_mm: median of the part that contacts of one finger share, which is one error for the whole session;
+            None in results without it.
+    """
 
     sigma_mm_median: float
     sigma_mm_p95: float
+    shared_sigma_mm: float | None
 
 
 @dataclass(frozen=True)
@@ -148,7 +155,8 @@ def _uncertainty(estimate: EstimateWithTruth) -> UncertaintyFigures | None:
     if (quantiles_m := estimate.results.sigma_quantiles_m) is None:
         return None
     median, p95 = 1e3 * np.percentile(quantiles_m, [50, 95])
-    return UncertaintyFigures(float(median), float(p95))
+    shared_m = estimate.results.slam.get("shared_sigma_m")
+    return UncertaintyFigures(float(median), float(p95), None if shared_m is None else 1e3 * float(shared_m))
 
 
 def _pose(estimate: EstimateWithTruth) -> PoseErrors | None:

@@ -11,6 +11,8 @@ from tactile_lab.evaluation.registration import registration_verdict
 
 UNKNOWN = "\u2013"
 NEEDS_TWO = "needs the true pose at two grasps"
+_PREVAILING = 0.5
+"""Share of the variance from which on a surface errs as a whole."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ def evaluation_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
         *_size_rows(evaluation.get("dimensions") or ()),
         *_pose_rows(evaluation.get("pose") or {}),
         _standard_row(evaluation.get("pose_umeyama") or {}),
-        *_consistency_rows(evaluation.get("consistency") or {}),
+        *_consistency_rows(evaluation.get("consistency") or {}, evaluation.get("uncertainty") or {}),
         *_run_rows(evaluation),
         *_further_rows(evaluation.get("further") or {}),
     ]
@@ -95,7 +97,7 @@ _JUDGED = (
 )
 
 
-def _consistency_rows(consistency: Mapping[str, Any]) -> list[EvaluationRow]:
+def _consistency_rows(consistency: Mapping[str, Any], uncertainty: Mapping[str, Any]) -> list[EvaluationRow]:
     """Coverage of each kind of statement that could be judged."""
     levels = consistency.get("levels") or ()
     stated = " / ".join(f"{100 * level:.0f}" for level in levels)
@@ -106,6 +108,8 @@ def _consistency_rows(consistency: Mapping[str, Any]) -> list[EvaluationRow]:
             rows.append(
                 EvaluationRow(label, inside, "%", f"of the stated {stated} % regions, {basis}; {_scored(found)}")
             )
+            if key == "surface" and (words := one_draw(uncertainty)):
+                rows[-1] = replace(rows[-1], note=f"{rows[-1].note}; {words}")
     return rows
 
 
@@ -140,6 +144,18 @@ def _run_rows(evaluation: Mapping[str, Any]) -> list[EvaluationRow]:
 
 def _further_rows(further: Mapping[str, Any]) -> list[EvaluationRow]:
     return [EvaluationRow(name, further_text(value), "", "from an extension") for name, value in further.items()]
+
+
+def one_draw(uncertainty: Mapping[str, Any]) -> str:
+    """Words beside the share of a surface inside its regions, if errors that a session has once prevail; else empty.
+
+    Args:
+        uncertainty: as in ``evaluation.json``; empty without a shape.
+    """
+    shared_mm, sigma_mm = uncertainty.get("shared_sigma_mm"), uncertainty.get("sigma_mm_median")
+    if shared_mm is None or sigma_mm is None or shared_mm**2 < _PREVAILING * sigma_mm**2:
+        return ""
+    return f"one draw: {shared_mm:.2f} of the {sigma_mm:.2f} mm of sigma is one error a finger, all session"
 
 
 def further_text(value: Any) -> str:

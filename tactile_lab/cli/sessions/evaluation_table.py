@@ -10,7 +10,7 @@ from rich.text import Text
 
 from tactile_lab.cli.console import answer, answers, count
 from tactile_lab.evaluation.registration import registration_verdict
-from tactile_lab.evaluation.table import further_text
+from tactile_lab.evaluation.table import further_text, one_draw
 
 UNKNOWN = "–"
 
@@ -71,7 +71,8 @@ def _consistency(content: Mapping[str, Any]) -> list[Table]:
     for label, found in known:
         scored = f"NEES {found['nees']:.2f}" if "nees" in found else f"mean {found['signed_mm']:+.2f} mm"
         grid.add_row(label, *(f"{100 * share:.0f} %" for share in found["inside"]), scored)
-    return [grid]
+    words = one_draw(content.get("uncertainty") or {}) if judged.get("surface") else ""
+    return [grid, *([_grid((words[0].upper() + words[1:],))] if words else [])]
 
 
 def _rest(content: Mapping[str, Any]) -> Table:

@@ -153,13 +153,18 @@ def _slam_record(result: SlamResult, settings: Mapping[str, Any]) -> dict[str, A
         "common_covariances": result.common_covariances,
         "loops": result.loops,
         "sigma_quantiles_m": _sigma_quantiles(result),
+        "shared_sigma_m": None if (shape := _shape(result)) is None else shape.shared_sigma_m,
     }
 
 
 def _sigma_quantiles(result: SlamResult) -> Array | None:
     """Standard deviation of the contour or surface, as percentiles from smallest to largest."""
-    shape = result.contour if result.contour is not None else result.mesh
+    shape = _shape(result)
     return None if shape is None else np.quantile(shape.sigma_m, np.linspace(0.0, 1.0, 101))
+
+
+def _shape(result: SlamResult) -> Contour | SurfaceMesh | None:
+    return result.contour if result.contour is not None else result.mesh
 
 
 def _without_duration(step: SlamStep) -> dict[str, Any]:

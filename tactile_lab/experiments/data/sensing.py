@@ -49,6 +49,36 @@ def without_paths(data: _Data) -> _Data:
     return replace(data, grasps=tuple(replace(grasp, approach_paths=()) for grasp in data.grasps))
 
 
+def with_finger_errors(data: _Data, sigma_m: float, rng: np.random.Generator) -> _Data:
+    """The same session by a hand whose fingers feel surfaces too far out or in, each by one error throughout, as biased
+    joint sensors do. The contacts state it.
+
+    Args:
+        data: a session.
+        sigma_m: standard deviation of each finger's error.
+        rng: source of the errors.
+    """
+    names = sorted({contact.finger for grasp in data.grasps for contact in grasp.contacts})
+    errors_m = dict(zip(names, rng.normal(0.0, sigma_m, len(names)), strict=True))
+    return replace(data, grasps=tuple(_felt_by(grasp, errors_m, sigma_m) for grasp in data.grasps))
+
+
+def _felt_by(grasp: Grasp, errors_m: dict[str, float], sigma_m: float) -> Grasp:
+    contacts, moved = [], {}
+    for contact in grasp.contacts:
+        normal = contact.normal_world
+        step, shared = errors_m[contact.finger] * normal, sigma_m**2 * np.outer(normal, normal)
+        moved[contact.finger] = step
+        placed = replace(contact, point_world_m=contact.point_world_m + step, shared_covariance_m2=shared)
+        contacts.append(replace(placed, point_covariance_m2=contact.point_covariance_m2 + shared))
+    lines = [
+        replace(line, start_world_m=line.start_world_m + step, end_world_m=line.end_world_m + step)
+        for line in grasp.approach_paths
+        for step in [moved.get(line.finger, np.zeros(3))]
+    ]
+    return replace(grasp, contacts=tuple(contacts), approach_paths=tuple(lines))
+
+
 def measured_contact(
     finger: str,
     point_body_m: Array,

@@ -12,7 +12,7 @@ from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data import planar_data, second_family, spatial_data
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
-from tactile_lab.experiments.data.sensing import SimulatedGrasps, without_paths
+from tactile_lab.experiments.data.sensing import SimulatedGrasps, with_finger_errors, without_paths
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.run_metrics import slam_figures
@@ -25,12 +25,18 @@ from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distance
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
-FIRST, SECOND = "first", "second"
-"""The families of simulated contacts: :mod:`planar_data` and :mod:`spatial_data`, and :mod:`second_family`."""
+FIRST, SECOND, FINGERS = "first", "second", "fingers"
+"""The families of simulated contacts: :mod:`planar_data` and :mod:`spatial_data`; :mod:`second_family`; and the first
+with an error that each finger has throughout a session, as the simulated rig's have.
+"""
+FINGER_SIGMA_m = 0.0008
+"""Joint sensors with a bias of 0.6 degrees each."""
 
 PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")
 SOLIDS = ("box-12x6x6", "l-block", "cylinder", "ellipsoid")
 _MORE_GRASPS_IN_SPACE = 1.5
+_OF_FINGERS = 71
+"""Apart from the random numbers of the contacts."""
 _FAR_SIGMAS, _FAR_SHARE = 5.0, 0.01
 """A shape is off if more than this share of it is farther from the truth than so many stated standard deviations."""
 
@@ -38,10 +44,11 @@ _FAR_SIGMAS, _FAR_SHARE = 5.0, 0.01
 def _settings(grasps: int) -> list[Setting]:
     shapes = {(FIRST, 2): PLANAR_SHAPES, (FIRST, 3): SOLIDS, (SECOND, 2): second_family.SHAPES}
     shapes[SECOND, 3] = second_family.SHAPES
+    shapes |= {(FINGERS, 2): PLANAR_SHAPES, (FINGERS, 3): SOLIDS}
     return [
         setting
         for (family, dimension), names in shapes.items()
-        for wrong in (0, 10)
+        for wrong in ((0,) if family == FINGERS else (0, 10))
         for setting in grid(family=[family], dimension=[dimension], wrong=[wrong], shape=names, grasps=[grasps])
     ]
 
@@ -88,6 +95,8 @@ def _data(cell: Cell) -> PlanarGrasps | SpatialGrasps:
         return SpatialGrasps(found.shape, found.grasps, found.world_T_body, mesh)
     simulate = planar_data.simulate if flat else spatial_data.simulate
     data: PlanarGrasps | SpatialGrasps = simulate(cell["shape"], cell.seed, count=count, outlier_share=wrong)
+    if cell["family"] == FINGERS:
+        data = with_finger_errors(data, FINGER_SIGMA_m, np.random.default_rng([cell.seed, _OF_FINGERS]))
     return without_paths(data) if wrong else data
 
 
@@ -115,7 +124,7 @@ def _panel(cell: Cell) -> str:
 
 CONSISTENCY = Experiment(
     "consistency",
-    "Whether the uncertainties that the default method states are true, on two families of simulated contacts.",
+    "Whether the uncertainties that the default method states are true, on three families of simulated contacts.",
     _settings,
     assessed_run,
     (

@@ -39,12 +39,14 @@ class Contour:
         sigma_m: shape (n,), standard deviation of the contour along its normal.
         is_closed: False if the field has no closed outline and was cut at the largest margin.
         known: of each point, whether it was touched nearby, shape (n,); None if that was not determined.
+        shared_sigma_m: median of the part of sigma that contacts of one finger share: the same throughout a session.
     """
 
     points_m: Array
     sigma_m: Array
     is_closed: bool
     known: Mask | None = None
+    shared_sigma_m: float = 0.0
 
     @property
     def normals(self) -> Array:
@@ -66,6 +68,7 @@ class SurfaceMesh:
         normals: shape (n, 3), outward unit normals at the vertices.
         is_closed: False if the field has no closed surface and was cut at the largest margin.
         known: of each vertex, whether it was touched nearby, shape (n,); None if that was not determined.
+        shared_sigma_m: median of the part of sigma that contacts of one finger share: the same throughout a session.
     """
 
     vertices: Array
@@ -74,6 +77,7 @@ class SurfaceMesh:
     normals: Array
     is_closed: bool
     known: Mask | None = None
+    shared_sigma_m: float = 0.0
 
 
 def extract_contour(field: SurfaceField, *, resolution_m: float = 0.001, largest_margin_m: float = 0.060) -> Contour:

@@ -54,13 +54,25 @@ def propagate_pose_uncertainty(
     normals = extracted.normals
     used = _walls(contact_map) if isinstance(shape, Prism) else contact_map
     axes = slice(0, used.dimension)
-    change = _change(used, noise, places_m[:, axes], normals[:, axes], faceted=_has_flat_faces(shape))
-    moved = _reshape(change, places_m, normals, on_table=contact_map.space is PLANAR)
-    return replace(extracted, sigma_m=np.sqrt(extracted.sigma_m**2 + np.einsum("qm,qm->q", moved, moved)))
+    changes = _changes(used, noise, places_m[:, axes], normals[:, axes], faceted=_has_flat_faces(shape))
+    on_table = contact_map.space is PLANAR
+    by_poses, by_fingers = (_variance(_reshape(each, places_m, normals, on_table=on_table)) for each in changes)
+    return replace(
+        extracted,
+        sigma_m=np.sqrt(extracted.sigma_m**2 + by_poses + by_fingers),
+        shared_sigma_m=float(np.sqrt(np.median(by_fingers))),
+    )
 
 
-def _change(contact_map: ContactMap, noise: MotionNoise, places_m: Array, normals: Array, *, faceted: bool) -> Array:
-    """Displacement of a surface along its normals by independent standard normal variables, shape (q, m).
+def _variance(change: Array) -> Array:
+    return np.asarray(np.einsum("qm,qm->q", change, change))
+
+
+def _changes(
+    contact_map: ContactMap, noise: MotionNoise, places_m: Array, normals: Array, *, faceted: bool
+) -> tuple[Array, Array]:
+    """Displacements of a surface along its normals by independent standard normal variables, shapes (q, m): by the
+    poses, and by what contacts of one finger share.
 
     Args:
         contact_map: see above, contacts in the plane or in space.
@@ -79,7 +91,8 @@ def _change(contact_map: ContactMap, noise: MotionNoise, places_m: Array, normal
         information, change = evidence.information(contact_map.rows), evidence.field_change(contact_map.rows, places_m)
     root = np.linalg.inv(np.linalg.cholesky(information)).T
     shared = _shared_change(contact_map, certainty, places_m, normals)
-    return np.asarray(np.hstack([change @ root, shared]) * np.linalg.norm(normals, axis=1, keepdims=True))
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.asarray(change @ root * lengths), np.asarray(shared * lengths)
 
 
 def _shared_change(contact_map: ContactMap, certainty: FacetCertainty | None, places_m: Array, normals: Array) -> Array:

@@ -157,6 +157,20 @@ def test_rows_for_people_show_dashes_for_what_is_unknown(results: Path) -> None:
     assert rows["Marker sightings"].note == f"{GRASPS} grasps without one"
 
 
+@pytest.mark.parametrize(
+    ("shared_mm", "said"), [(0.44, "0.44 of the 0.52 mm of sigma is one error a finger"), (0.2, ""), (None, "")]
+)
+def test_a_surface_whose_sigma_fingers_share_is_called_one_draw(shared_mm: float | None, said: str) -> None:
+    surface = {"inside": [1.0, 1.0, 1.0], "log_score": 6.6, "signed_mm": 0.07}
+    content = {
+        "consistency": {"levels": [0.5, 0.68, 0.95], "surface": surface},
+        "uncertainty": {"sigma_mm_median": 0.52, "sigma_mm_p95": 0.55, "shared_sigma_mm": shared_mm},
+    }
+    (row,) = (row for row in evaluation_rows(content) if row.label == "Surface inside")
+    assert said in row.note
+    assert ("one draw" in row.note) is bool(said)
+
+
 def message(topic: str, data: bytes, number: int) -> TrafficMessage:
     return TrafficMessage(topic, data, 1000 * number, number)
 

@@ -85,6 +85,8 @@ def test_the_outline_is_stated_less_certain_by_what_fingers_share(known: Contact
     assert np.all(with_poses.sigma_m >= contour.sigma_m)
     added_m = np.sqrt(np.median(with_both.sigma_m**2 - with_poses.sigma_m**2))
     assert 0.2 * SHARED_m < added_m < SHARED_m
+    assert with_both.shared_sigma_m == pytest.approx(added_m, rel=0.05)
+    assert with_poses.shared_sigma_m == 0.0
 
 
 def test_contacts_keep_their_fingers_where_they_are_selected_moved_and_gathered() -> None:
