@@ -186,16 +186,29 @@ class RigRuntime:
     # --- the cycle ---------------------------------------------------------------------------------------------
 
     def cycle(self) -> None:
-        """Run one cycle over all devices and wait for the next deadline. Raises DeviceError."""
+        """Run one cycle over all devices and wait for the next deadline.
+
+        Raises:
+            DeviceError: a device failed; if the session itself was late before, it says so too.
+        """
         self._timing.begin()
+        try:
+            self._exchange()
+        except DeviceError as error:
+            if not (late := self._timing.lateness()):
+                raise
+            hint = f"{late}. {error.hint}" if error.hint else late
+            raise type(error)(error.what, where=error.where, hint=hint) from error
+        self._state.record()
+        self._timing.wait()
+
+    def _exchange(self) -> None:
         self.hand.exchange()
         self.base.exchange()
         for device in self.wrench_devices.values():
             device.poll()
         if isinstance(self.camera, WatchingCamera):
             self.camera.poll()
-        self._state.record()
-        self._timing.wait()
 
     def snapshot(self) -> CycleSnapshot:
         """The last cycle as the safety supervisor sees it."""

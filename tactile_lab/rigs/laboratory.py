@@ -93,7 +93,10 @@ class WiredLaboratory:
     def remarks(self) -> tuple[str, ...]:
         """Whether the physics could not keep up with the clock; see :class:`Laboratory`."""
         lost_s = 0.0 if self.emulators is None else self.emulators.lost_s
-        return (f"the emulated laboratory stalled for {lost_s:.1f} s: this computer is too slow",) if lost_s else ()
+        words = (
+            f"the emulated laboratory stalled for {1000 * lost_s:.0f} ms in all: this computer is too slow or too busy"
+        )
+        return (words,) if lost_s else ()
 
 
 @contextmanager

@@ -73,6 +73,7 @@ class JointCalibration:
         joints: Collection[str] = JOINTS,
     ) -> None:
         _check_complete([*tables, *(joint for pair in coupled for joint in pair)], where, joints)
+        self._where = where
         tables = {joint: table for joint, table in tables.items() if joint in joints}
         coupled = {pair: points for pair, points in coupled.items() if set(pair) <= set(joints)}
         self.has_joint: NDArray[np.bool_] = np.isin(JOINTS, list(joints))
@@ -134,12 +135,9 @@ class JointCalibration:
         Raises:
             ConfigurationError: a coupled table does not determine both angles.
         """
-        fixed = [JOINTS[joint] for joints, plane in self._pairs if not plane.invertible for joint in joints]
-        if fixed:
-            raise ConfigurationError(
-                f"the calibration of {' and '.join(fixed)} does not determine both angles",
-                hint="Use another calibration for an emulated hand",
-            )
+        for joints, plane in self._pairs:
+            if not plane.invertible:
+                raise self._undetermined(joints)
         angles_deg = np.degrees(joints_rad)
         counts = np.zeros(len(JOINTS))
         counts[self._plain] = self._curves.inverse(angles_deg[self._plain])
@@ -148,6 +146,20 @@ class JointCalibration:
         sensors = _IDLE_SENSORS.copy()
         sensors[SENSOR_HAS_JOINT] = counts[JOINT_OF_SENSOR]
         return sensors
+
+    def _undetermined(self, pair: NDArray[np.intp]) -> ConfigurationError:
+        names, degrees = [JOINTS[joint] for joint in pair], np.degrees(self.range_rad[pair])
+        fixed = [
+            f"{name} is {low:g} degrees in every row"
+            for name, (low, high) in zip(names, degrees, strict=True)
+            if low == high
+        ]
+        why = f": {', '.join(fixed)}" if fixed else ""
+        return ConfigurationError(
+            f"sr_calibrations_coupled: the table of {' and '.join(names)} does not determine both angles{why}",
+            where=self._where,
+            hint="A real hand can use it as it is; an emulated one needs another calibration, in which both turn",
+        )
 
 
 def joint_counts(sensors: NDArray[np.uint16] | Array) -> Array:

@@ -114,6 +114,25 @@ def test_a_slow_cycle_is_counted_and_does_not_move_the_grid():
     rig.runtime.close()
 
 
+def test_a_failure_says_too_that_the_session_itself_was_late(monkeypatch):
+    def fail():
+        raise DeviceError("no command from the session for 2.0 s", where="hand", hint="Resume it")
+
+    rig = make_rig(unsteady=False)
+    rig.runtime.connect()
+    monkeypatch.setattr(rig.runtime.hand, "exchange", fail)
+    with pytest.raises(DeviceError, match=r"^hand: no command from the session for 2\.0 s\. Resume it$"):
+        rig.runtime.cycle()
+    monkeypatch.undo()
+    rig.devices["hand"].work_ns = 3_000_000_000
+    rig.runtime.cycle()
+    monkeypatch.setattr(rig.runtime.hand, "exchange", fail)
+    with pytest.raises(DeviceError, match=r"2\.0 s\. The session itself was late: 3\.0 s taking in .*\. Resume it$"):
+        rig.runtime.cycle()
+    monkeypatch.undo()
+    rig.runtime.close()
+
+
 def test_bytes_are_recorded_before_they_are_understood():
     memory = Memory()
     rig = make_rig(Recorder(memory), unsteady=False)

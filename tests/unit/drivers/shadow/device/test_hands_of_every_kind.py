@@ -115,7 +115,8 @@ def test_published_folders_that_are_at_hand_move_or_are_refused_with_the_defect(
     assert told
     for folder, words in told.items():
         if folder.name in UNDETERMINED:
-            assert "THJ1 and THJ2 does not determine both angles" in words
+            assert f"{folder.name}/calibration.yaml: " in words
+            assert "THJ1 and THJ2 does not determine both angles: THJ1 is 20 degrees" in words
         elif folder.name in DEFECTIVE:
             assert f"{folder.name}/" in words
             assert "calibration.yaml" in words

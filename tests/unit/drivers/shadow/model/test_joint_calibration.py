@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -155,9 +156,17 @@ def test_a_fixed_joint_has_one_angle_and_reads_the_middle_of_its_table() -> None
     assert calibration.raw_counts(np.zeros(24))[0] == 0.5
 
 
-def test_a_coupling_that_leaves_an_angle_open_cannot_be_emulated(lab_data: Path) -> None:
-    calibration = JointCalibration.load(lab_data / "shadow_hand_config" / "554" / "calibration.yaml")
-    with pytest.raises(ConfigurationError, match="THJ1 and THJ2 does not determine both"):
+def test_a_coupling_that_leaves_an_angle_open_cannot_be_emulated(tmp_path: Path) -> None:
+    """As in a published hand without a sensor in the thumb's last joint: file, joint, value and remedy are named."""
+    rows = [[[1.0, 2061.0], 20.0, -40.0], [[0.0, 2128.0], 20.0, -15.0], [[0.0, 2405.0], 20.0, 40.0]]
+    path = tmp_path / "calibration.yaml"
+    plain = [[joint, table] for joint, table in tables().items() if joint not in ("THJ1", "THJ2")]
+    path.write_text(yaml.safe_dump({"sr_calibrations": plain, "sr_calibrations_coupled": [[["THJ1", "THJ2"], rows]]}))
+    calibration = JointCalibration.load(path)
+    words = (
+        f"^{re.escape(str(path))}: .*THJ1 and THJ2 does not determine both angles: THJ1 is 20 degrees.*needs another"
+    )
+    with pytest.raises(ConfigurationError, match=words):
         calibration.raw_counts(np.zeros(24))
 
 
