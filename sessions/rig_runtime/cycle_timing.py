@@ -88,8 +88,8 @@ class CycleTiming:
             return ""
         busy = "busy with other work" if longest.between_ns > longest.devices_ns else "taking in what the devices sent"
         return (
-            f"The session itself was late: {length_s:.1f} s {busy}, its cycle is {1000 * usual_s:g} ms. This computer is "
-            "too slow or too busy: end other programs, or give the rig longer cycles (cycle_s, hand.cycle_s)"
+            f"The session itself was late: {length_s:.1f} s {busy}, its cycle is {1000 * usual_s:g} ms. This computer "
+            "is too slow or too busy: end other programs, or give the rig longer cycles (cycle_s, hand.cycle_s)"
         )
 
     def _turn(self) -> _Turn:

@@ -204,4 +204,4 @@ def test_an_emulated_laboratory_that_could_not_keep_up_says_so(tmp_path: Path) -
 
     assert place(0.0).remarks() == ()
     (remark,) = place(1.26).remarks()
-    assert remark == "the emulated laboratory stalled for 1.3 s: this computer is too slow"
+    assert remark == "the emulated laboratory stalled for 1260 ms in all: this computer is too slow or too busy"
