@@ -22,7 +22,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from tactile_lab.workflow.printing import measure, print_rig_markers, print_sheet
 
-PX_PER_mm = 8.0
+PX_PER_mm = 5.0
 
 
 def paint(loops: list[list[Array]], size_mm: tuple[float, float]) -> Image:

@@ -16,7 +16,7 @@ from tests.support.published_hands_table import outcome, published_folders
 LITE = next(kind for kind in FOLDERS if kind.name == "rh_lite_v1")
 
 
-QUICK = ("rh_E_v4", "lh_E_v5", "rh_lite_v1", "rh_extra_lite_v1", "rh_E_v3_no_mf_rf_lf")
+QUICK = ("rh_E_v4", "lh_E_v5", "rh_extra_lite_v1")
 KINDS = [pytest.param(kind, id=kind.name, marks=[] if kind.name in QUICK else pytest.mark.long) for kind in FOLDERS]
 
 
