@@ -43,9 +43,14 @@ class Table:
         return tuple(row[: self.keys])
 
     def without(self, other: Table) -> Table:
-        """The rows that the other table does not have; all of them if its columns differ."""
-        known = {other.key(row) for row in other.rows} if self.head == other.head else set()
+        """The rows that the other table does not have; all of them if it is about something else."""
+        known = {other.key(row) for row in other.rows} if self._is_alike(other) else set()
         return replace(self, rows=tuple(row for row in self.rows if self.key(row) not in known))
+
+    def _is_alike(self, other: Table) -> bool:
+        """Whether the same rows are identified in the same way; what is told of them may differ."""
+        keys = self.head[: self.keys], other.head[: other.keys]
+        return self.head == other.head or (self.title == other.title and keys[0] == keys[1])
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""

@@ -66,6 +66,13 @@ def test_new_rows_replace_those_of_the_same_settings_and_the_others_stay() -> No
     )
 
 
+def test_rows_replace_those_of_the_same_settings_that_told_something_else() -> None:
+    told = Table("", (*HEAD[:2], "only this"), (("joint", "L", "1"), ("icp", "L", "2")), 2)
+    older = replace(made(OLD, ("joint", "L")), tables=(told,))
+    (left,) = combine(made(NOW, ("joint", "L")), (older,))[1].tables
+    assert left.rows == (("icp", "L", "2"),)
+
+
 def test_tables_with_other_columns_stay() -> None:
     older = replace(made(OLD, ("joint", "L")), tables=(POOLED,))
     assert combine(made(NOW, ("joint", "L")), (older,))[1].tables == (POOLED,)
