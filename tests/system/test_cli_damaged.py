@@ -210,6 +210,8 @@ def test_a_pipe_beside_a_recording_is_left_out_of_its_recovery(inside, session_c
 def test_results_that_are_nested_too_deeply_hide_no_others(inside, session_copy, tmp_path):
     for name in ("evaluation.json", "slam.json"):
         (session_copy / "results" / name).write_text(100_000 * "[")
-    assert inside("session", "catalogue", tmp_path, "--out", tmp_path / "all.csv").code == 0
+    listed = inside("session", "catalogue", tmp_path, "--out", tmp_path / "all.csv")
+    assert listed.code == 3
+    assert "evaluation.json: is not readable JSON (nested too deeply)" in listed.err
     assert len((tmp_path / "all.csv").read_text().splitlines()) == 2
     assert "slam.json" in inside("session", "replay", session_copy).err
