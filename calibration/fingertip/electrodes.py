@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_input
 
 LEAST_SAMPLES = 20
 LARGEST_DRIFT = 30.0
@@ -25,12 +25,8 @@ def load_untouched(path: Path) -> Array:
         ConfigurationError: it cannot be read, or is no such table.
     """
     try:
-        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8").replace(",", " ")
+        text = read_input(path, LARGEST_TABLE_bytes).decode("utf-8").replace(",", " ")
         counts = np.array([[float(word) for word in line.split()] for line in text.splitlines() if line.strip()])
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
     except ValueError as error:
         hint = "Give one line per sample and one column per electrode, numbers only"
         raise ConfigurationError("is not a table of counts", where=str(path), hint=hint) from error

@@ -25,7 +25,7 @@ from drivers.core.configuration import StrictModel, validate
 from drivers.core.contacts import FINGERS
 from drivers.core.errors import ConfigurationError
 from drivers.core.fingertip import RigidTransform, Vector3
-from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_input
 from drivers.core.reading.json_text import parse_json
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINTS
@@ -189,11 +189,7 @@ def save_data(path: Path, data: ForearmData) -> None:
 
 def _json(path: Path) -> Any:
     try:
-        return parse_json(read_bounded(path, LARGEST_JSON_bytes))
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
+        return parse_json(read_input(path, LARGEST_JSON_bytes))
     except ValueError as error:
         raise ConfigurationError("is not JSON", where=str(path), hint="Check the file") from error
 

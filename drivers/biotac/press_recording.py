@@ -20,7 +20,7 @@ from drivers.biotac.electrodes import ElectrodeCount
 from drivers.biotac.learned_normal import Presses
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_bounded
+from drivers.core.reading.bounded_files import LARGEST_TABLE_bytes, read_input
 
 _NORMAL = ("nx", "ny", "nz")
 _COUNTS: tuple[ElectrodeCount, ...] = get_args(ElectrodeCount)
@@ -66,11 +66,7 @@ def _units(directions: Array, where: str) -> Array:
 
 def _matrix(path: Path) -> Array:
     try:
-        values = np.loadtxt(io.BytesIO(read_bounded(path, LARGEST_TABLE_bytes)), ndmin=2)
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
+        values = np.loadtxt(io.BytesIO(read_input(path, LARGEST_TABLE_bytes)), ndmin=2)
     except ValueError as error:
         hint = "Give a text file of numbers, one column per sample and as many in every line"
         raise ConfigurationError("is not a table of numbers", where=str(path), hint=hint) from error
@@ -81,12 +77,8 @@ def _matrix(path: Path) -> Array:
 
 def _table(path: Path) -> tuple[Array, Array]:
     try:
-        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8")
+        text = read_input(path, LARGEST_TABLE_bytes).decode("utf-8")
         rows = list(csv.reader(io.StringIO(text, newline="")))
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
     except (UnicodeDecodeError, csv.Error) as error:
         hint = "Give comma-separated values in UTF-8"
         raise ConfigurationError("is not a text file of a table", where=str(path), hint=hint) from error

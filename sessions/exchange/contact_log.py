@@ -23,7 +23,7 @@ from drivers.core.contact_checks import opposing_pairs
 from drivers.core.contacts import LARGEST_SLOPE, ApproachPath, Array, Contact, Grasp, StepSigma
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import palm_heading, planar, spatial
-from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_bounded
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, read_input
 from drivers.core.reading.json_text import parse_json
 from sessions.exchange.contact_form import (
     FORMAT,
@@ -124,11 +124,7 @@ def write_contact_log(path: Path, log: ContactLog) -> int:
 
 def _load_json(path: Path) -> Any:
     try:
-        return parse_json(read_bounded(path, LARGEST_JSON_bytes), object_pairs_hook=_without_repeats)
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
+        return parse_json(read_input(path, LARGEST_JSON_bytes), object_pairs_hook=_without_repeats)
     except ValueError as error:
         raise ConfigurationError(f"is not JSON ({error})", where=str(path)) from error
 

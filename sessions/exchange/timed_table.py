@@ -16,7 +16,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, LARGEST_TABLE_bytes, read_bounded
+from drivers.core.reading.bounded_files import LARGEST_JSON_bytes, LARGEST_TABLE_bytes, read_input
 from drivers.core.reading.json_text import parse_json
 
 FORMAT = "tactile-timed-contacts/1"
@@ -48,16 +48,12 @@ def _check_count(rows: int, path: Path) -> None:
 def read_csv(path: Path) -> list[dict[str, str]]:
     """The lines of a CSV table without their empty values. Raises ConfigurationError."""
     try:
-        text = read_bounded(path, LARGEST_TABLE_bytes).decode("utf-8-sig")
+        text = read_input(path, LARGEST_TABLE_bytes).decode("utf-8-sig")
         _check_count(text.count("\n"), path)
         with io.StringIO(text, newline="") as file:
             lines = csv.DictReader(line for line in file if not line.startswith("#"))
             rows = [{str(name).strip(): value for name, value in row.items()} for row in lines]
             names = [name.strip() for name in lines.fieldnames or ()]
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
     except UnicodeDecodeError as error:
         raise ConfigurationError("is not a text file", where=str(path), hint="Give a CSV table in UTF-8") from error
     except csv.Error as error:
@@ -77,11 +73,7 @@ def read_csv(path: Path) -> list[dict[str, str]]:
 def read_json(path: Path) -> dict[str, Any]:
     """A document of the form :data:`FORMAT`. Raises ConfigurationError."""
     try:
-        document = parse_json(read_bounded(path, LARGEST_JSON_bytes))
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
+        document = parse_json(read_input(path, LARGEST_JSON_bytes))
     except ValueError as error:
         raise ConfigurationError(f"is not JSON ({error})", where=str(path)) from error
     form = document.get("format") if isinstance(document, dict) else None

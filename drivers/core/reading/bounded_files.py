@@ -43,6 +43,19 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
     return content
 
 
+def read_input(path: Path, most_bytes: int) -> bytes:
+    """As :func:`read_bounded`, for a file that a person names.
+
+    Raises:
+        ConfigurationError: it is missing, cannot be read, is larger, or a pipe or device.
+    """
+    try:
+        return read_bounded(path, most_bytes)
+    except OSError as error:
+        what = f"cannot be read ({error.strerror})"
+        raise ConfigurationError(what, where=str(path), hint="Check the path") from error
+
+
 def open_plain(path: Path) -> BinaryIO:
     """A plain file of any size, for who reads it piece by piece. Raises OSError, for a pipe or device too."""
     file = _opened(path)

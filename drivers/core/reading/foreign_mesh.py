@@ -9,13 +9,10 @@ from typing import Any
 import trimesh
 
 from drivers.core.errors import ConfigurationError
-from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, read_bounded
+from drivers.core.reading.bounded_files import LARGEST_MESH_bytes, read_bounded, read_input
 
 FORMATS = (".ply", ".stl", ".obj", ".glb", ".gltf", ".off", ".3mf")
 """Other formats of trimesh, archives and drawings among them, take minutes for what a few kilobytes say."""
-
-
-_FORMATS_HINT = "Give a PLY, STL, OBJ or GLB file"
 
 
 class _ElsewhereError(Exception):
@@ -64,13 +61,8 @@ def load_foreign_mesh(path: Path, **options: Any) -> Any:
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         what = f"is not a mesh that can be read: {suffix or 'a name without a suffix'} is none of its formats"
-        raise ConfigurationError(what, where=str(path), hint=_FORMATS_HINT)
-    try:
-        content = io.BytesIO(read_bounded(path, LARGEST_MESH_bytes))
-    except OSError as error:
-        raise ConfigurationError(
-            f"cannot be read ({error.strerror})", where=str(path), hint="Check the path"
-        ) from error
+        raise ConfigurationError(what, where=str(path), hint="Give a PLY, STL, OBJ or GLB file")
+    content = io.BytesIO(read_input(path, LARGEST_MESH_bytes))
     try:
         return trimesh.load(content, file_type=suffix[1:], resolver=_Beside(path.parent), **options)
     except _ElsewhereError as error:
