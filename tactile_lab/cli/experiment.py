@@ -80,21 +80,23 @@ def experiment(
         raise typer.BadParameter(
             "a result made by several versions cannot be stored: leave out --keep", param_hint="'--store'"
         )
+    from tactile_lab.experiments.runner import LINES_FILE, RunnerSettings, check_results, kept_rows, run_cells
+
+    folder = out or Path("runs/experiments") / name
+    others = tuple(each / LINES_FILE for each in merge or ())
+    check_results(name, folder / LINES_FILE, others)  # before the studies are loaded, which takes seconds
     from tactile_lab.cli.console import answer, emit_json, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
     from tactile_lab.experiments.parquet import write_parquet
     from tactile_lab.experiments.reporting import document, part_of, write_report
-    from tactile_lab.experiments.runner import LINES_FILE, RunnerSettings, kept_rows, run_cells
     from tactile_lab.experiments.summary import group_runs, short_table
 
     study, processes = experiment(name), jobs or os.cpu_count() or 1
-    folder = out or Path("runs/experiments") / name
     cells = study.cells(_seeds(seeds), _limits(only or []), grasps)
     if study.left_out():
         warn(study.left_out())
     with ExperimentProgress(study.name, len(cells)) as progress:
-        others = tuple(each / LINES_FILE for each in merge or ())
         settings = RunnerSettings(processes, keep, scheduler, others=others)
         rows = run_cells(name, cells, study.work, folder / LINES_FILE, settings, progress.on_finished)
     command = _command(name, seeds, only or [], grasps, jobs)

@@ -102,6 +102,13 @@ def _execute(cells: Sequence[Cell], work: Work, settings: RunnerSettings) -> Ite
     return run_in_processes(cells, work, settings.jobs)
 
 
+def check_results(name: str, file: Path, others: Sequence[Path] = ()) -> None:
+    """Refuse files of results that :func:`run_cells` would refuse. Raises ConfigurationError as it does."""
+    _known_rows(name, file, keep=True)
+    for other in others:
+        _rows_of_another_machine(name, other)
+
+
 def kept_rows(name: str, file: Path) -> list[Row]:
     """All results in the file that this version of the program made. Raises ConfigurationError as :func:`run_cells`."""
     return list(_known_rows(name, file, keep=False)[0].values())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,15 @@ def test_one_command_stores_an_outcome_and_writes_its_page(tmp_path):
     assert "experiment graph-stress --seeds 0-1" in invoke("commands", "--docs", docs).stdout
     forgetful = invoke("graph-stress", "--out", tmp_path / "x", *TINY, "--store", "--forget", "--docs", docs)
     assert "solver GNC" in str(forgetful.exception)  # which the claims show
+
+
+@pytest.mark.parametrize("option", ["--out", "--merge"])
+def test_a_damaged_file_of_results_is_told_before_the_studies_are_loaded(tmp_path, monkeypatch, option):
+    (tmp_path / "runs.jsonl").write_text("hello\n")
+    monkeypatch.setitem(sys.modules, "tactile_lab.experiments.catalogue", None)  # whoever loads it now fails
+    answer = invoke("graph-stress", option, tmp_path, *TINY)
+    assert isinstance(answer.exception, ConfigurationError)
+    assert "not a results file" in str(answer.exception)
 
 
 def test_nothing_is_stored_that_several_versions_made_or_beside_no_repository(tmp_path):
