@@ -6,7 +6,7 @@ A device never knows whether its transport is hardware, a simulated world or a r
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -40,17 +40,13 @@ class Transport(Protocol):
         """Everything that has arrived since the last call, oldest first; never blocks for long."""
 
 
-@runtime_checkable
-class WatchedTransport(Protocol):
-    """A transport that reports problems below the messages: unknown senders, drops, damaged frames."""
-
-    def health(self) -> tuple[str, ...]:
-        """Problems as text; empty if there are none."""
-
-
 def link_health(transport: Transport) -> tuple[str, ...]:
-    """Problems that a transport of any kind reports."""
-    return transport.health() if isinstance(transport, WatchedTransport) else ()
+    """Problems below the messages that a transport's method ``health`` reports: unknown senders, drops, damaged frames.
+
+    Empty for a transport without it. It is asked for in every cycle: a protocol would be checked fifty times as long.
+    """
+    health: Callable[[], tuple[str, ...]] | None = getattr(transport, "health", None)
+    return () if health is None else health()
 
 
 @runtime_checkable

@@ -29,20 +29,15 @@ class HandReading(Protocol):
     def fresh(self) -> bool: ...
 
 
-@runtime_checkable
-class MotorTemperatures(Protocol):
-    """Temperatures near the motors, shape (20,), degrees Celsius; NaN if unknown."""
-
-    @property
-    def temperature_C(self) -> Array: ...
-
-
 def warmest_C(reading: object) -> float | None:
-    """Temperature of the warmest motor in a sample of the hand; None while unknown."""
-    motors = getattr(reading, "motor", None)
-    if not isinstance(motors, MotorTemperatures) or not (known := np.isfinite(motors.temperature_C)).any():
+    """Temperature of the warmest motor in a sample of the hand; None while unknown.
+
+    A hand that measures them has them near its motors, shape (20,), degrees Celsius; NaN if unknown.
+    """
+    temperature_C = getattr(getattr(reading, "motor", None), "temperature_C", None)
+    if temperature_C is None or not (known := np.isfinite(temperature_C)).any():
         return None
-    return float(motors.temperature_C[known].max())
+    return float(temperature_C[known].max())
 
 
 def motor_torques(reading: object) -> Array | None:

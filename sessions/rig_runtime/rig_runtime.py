@@ -76,6 +76,7 @@ class RigRuntime:
     ) -> None:
         self.clock, self.cycle_ns = clock, cycle_ns
         self.hand, self.base, self.camera = hand, base, camera
+        self._watching = camera if isinstance(camera, WatchingCamera) else None  # looked up once, not in every cycle
         self.wrench_devices = dict(wrench_devices or {})
         self.fingertip_calibrations = dict(fingertip_calibrations or {})
         self._timing = CycleTiming(clock, cycle_ns)
@@ -207,8 +208,8 @@ class RigRuntime:
         self.base.exchange()
         for device in self.wrench_devices.values():
             device.poll()
-        if isinstance(self.camera, WatchingCamera):
-            self.camera.poll()
+        if self._watching is not None:
+            self._watching.poll()
 
     def snapshot(self) -> CycleSnapshot:
         """The last cycle as the safety supervisor sees it."""

@@ -21,7 +21,7 @@ from drivers.core.poses import transform_points
 from sessions.recording.session import TRAFFIC, Session
 from tactile_lab.evaluation.trajectory import Poses
 from tactile_lab.evaluation.truth.marker_truth import MarkerTruth
-from tactile_lab.evaluation.truth.session_truth import camera_datagrams, marked_pictures
+from tactile_lab.evaluation.truth.session_truth import camera_datagrams, marked_pictures, picture_messages
 from tactile_lab.report.svg import Chart, Frame
 from tactile_lab.rigs.description import OTHER_VERSION
 
@@ -76,10 +76,10 @@ def _last_view(session: Session, world_T_object: Poses) -> tuple[CameraView | No
     where = f"{session.folder}/session.yaml"
     markers = validate(session.manifest.settings.get("markers", {}), MarkerSettings, where=where, hint=OTHER_VERSION)
     lens = load_camera(session.calibration_file(_CAMERA))
-    camera_T_world = MarkerTruth(lens, markers, camera_datagrams(session.traffic().messages())).camera_T_world()
+    camera_T_world = MarkerTruth(lens, markers, camera_datagrams(session)).camera_T_world()
     if camera_T_world is None:
         return None, "the camera did not see the world marker"
-    pictures = marked_pictures(session.traffic().messages())
+    pictures = marked_pictures(picture_messages(session))
     for grasp in sorted(pictures, reverse=True):
         if grasp < len(world_T_object) and world_T_object[grasp] is not None:
             image = decode_packet(pictures[grasp]).image

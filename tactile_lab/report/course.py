@@ -84,7 +84,7 @@ def read_course(session: Session) -> Course:
         return Course()
     decisions: list[PolicyDecision] = []
     stops: list[Stop] = []
-    for message in session.traffic().messages():
+    for message in session.traffic().messages_on({DECISION_TOPIC, SAFETY_TOPIC}):
         if message.topic == DECISION_TOPIC:
             newest = _read(message, path, _decision)
             decisions = [*(one for one in decisions if one.number < newest.number), newest]

@@ -16,8 +16,7 @@ _DRAW_ns = NANOSECONDS // 10
 
 def shown_messages(session: Session, skip: int = 0) -> Iterator[TrafficMessage]:
     """Messages of a session so far that a page shows, without the first ``skip``. Raises SessionError."""
-    shown = (message for message in session.traffic().messages() if message.topic in SHOWN_TOPICS)
-    for number, message in enumerate(shown):
+    for number, message in enumerate(session.traffic().messages_on(SHOWN_TOPICS)):
         if number >= skip:
             yield message
 

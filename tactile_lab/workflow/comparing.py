@@ -136,7 +136,7 @@ def session_clock_offset(session: Session, choice: TruthChoice) -> ClockOffset:
 
 def _object_track(session: Session, detector: MarkerTruth) -> tuple[Array, Array]:
     rows = []
-    for datagram in camera_datagrams(session.traffic().messages()):
+    for datagram in camera_datagrams(session):
         pose = detector(datagram)
         if pose is not None:
             rows.append((datagram.stamp_ns / NANOSECONDS, pose.x(), pose.y()))
@@ -149,7 +149,7 @@ def _hand_track(session: Session) -> tuple[Track | None, list[tuple[float, float
     stamps, places, turns = [], [], []
     holds: list[tuple[float, float]] = []
     begun: float | None = None
-    for message in session.traffic().messages():
+    for message in session.traffic().messages_on({SESSION_EVENTS_TOPIC, TRANSFORMS_TOPIC}):
         if message.topic == SESSION_EVENTS_TOPIC:
             event = SessionEvent.from_bytes(message.data)
             if event.kind is EventKind.HOLD_BEGIN:

@@ -20,7 +20,7 @@ from sessions.conductor.progress import NullProgress, Progress
 from sessions.conductor.session_outcome import SessionOutcome
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.recording.session import RESULTS, Session
-from sessions.recording.traffic.loss import Loss
+from sessions.recording.traffic.reader import TrafficReader
 from tactile_lab import report
 from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import Evaluation, evaluate
@@ -114,8 +114,9 @@ def evaluate_session(session: Session) -> FinishedSession:
     Raises:
         SessionError: there are no results, or the recording cannot be read.
     """
-    evaluation, loss = _write_evaluation(session, rig_of_session(session), session.results)
-    return FinishedSession(session.folder, session.results, evaluation=evaluation, unread=loss.describe())
+    traffic, rig = session.traffic(), rig_of_session(session)
+    evaluation = _write_evaluation(session, rig, session.results, traffic)
+    return FinishedSession(session.folder, session.results, evaluation=evaluation, unread=traffic.loss.describe())
 
 
 def has_results(session: Session) -> bool:
@@ -173,7 +174,7 @@ def finish(
         result = slam.finish()
         write_results(out, result, grasps, wanted.model_dump(mode="json"), wanted.largest_sigma_m)
         write_properties(out, properties or ObjectProperties(), result.world_T_object)
-        evaluation, _ = _write_evaluation(session, rig, out)
+        evaluation = _write_evaluation(session, rig, out)
         report.write(session.folder, out)
     except TactileLabError as error:
         return FinishedSession(session.folder, out, problem=str(error))
@@ -190,10 +191,10 @@ def remove_results(out: Path) -> None:
         raise SessionError(f"cannot be replaced ({error.strerror})", where=str(out / name), hint=hint) from error
 
 
-def _write_evaluation(session: Session, rig: Rig, out: Path) -> tuple[Evaluation, Loss]:
-    traffic, count = session.traffic(), len(read_results(out).trajectory.stamps_s)
+def _write_evaluation(session: Session, rig: Rig, out: Path, traffic: TrafficReader | None = None) -> Evaluation:
+    count = len(read_results(out).trajectory.stamps_s)
     truth = session_truth(session, count, marker_detector(session, rig), traffic)
-    return write_evaluation(out, truth, session.manifest.object_name), traffic.loss
+    return write_evaluation(out, truth, session.manifest.object_name)
 
 
 def write_evaluation(out: Path, truth: Truth, object_name: str) -> Evaluation:
@@ -229,4 +230,4 @@ def marker_detector(session: Session, rig: Rig, choice: TruthChoice | None = Non
     if choice.markers is not None:
         markers = load_parameters(choice.markers, MarkerSettings)
     lens = load_camera(choice.lens or rig.files["camera"])
-    return MarkerTruth(lens, markers, camera_datagrams(session.traffic().messages()), choice.basis)
+    return MarkerTruth(lens, markers, camera_datagrams(session), choice.basis)

@@ -7,6 +7,7 @@ recordings spends most of its time here.
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from io import BytesIO
 
 import zstandard
@@ -23,8 +24,12 @@ _HEAD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 
 
-def split_chunk(chunk: Chunk) -> list[McapRecord]:
+def split_chunk(chunk: Chunk, is_wanted: Callable[[Channel], bool] | None = None) -> list[McapRecord]:
     """The messages and channels in a chunk, in their order; other records are left out.
+
+    Args:
+        chunk: packed or not.
+        is_wanted: tells of a channel that the chunk describes whether its messages are; None: all messages are.
 
     Raises:
         ValueError, McapError, zstandard.ZstdError, struct.error: the chunk is too large or damaged.
@@ -33,6 +38,7 @@ def split_chunk(chunk: Chunk) -> list[McapRecord]:
     stream, size = get_chunk_data_stream(chunk, validate_crc=True)
     data = stream.read(size)
     records: list[McapRecord] = []
+    unwanted: set[int] = set()
     position = 0
     while position < size:
         opcode, length = _HEAD.unpack_from(data, position)
@@ -41,18 +47,21 @@ def split_chunk(chunk: Chunk) -> list[McapRecord]:
         if position > size:
             raise ValueError("a record is longer than its chunk")
         if opcode == _MESSAGE_OPCODE:
-            records.append(_message(data, start, position))
+            if position - start < _MESSAGE.size:
+                raise ValueError("a message is too short")
+            if not unwanted or data[start] | data[start + 1] << 8 not in unwanted:  # its channel
+                records.append(_message(data, start, position))
         elif opcode == _CHANNEL_OPCODE:
-            records.append(Channel.read(ReadDataStream(BytesIO(data[start:position]))))
+            channel = Channel.read(ReadDataStream(BytesIO(data[start:position])))
+            if is_wanted is not None and not is_wanted(channel):
+                unwanted.add(channel.id)
+            records.append(channel)
     return records
 
 
 def _message(data: bytes, start: int, end: int) -> Message:
-    content = start + _MESSAGE.size
-    if content > end:
-        raise ValueError("a message is too short")
     channel_id, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, start)
-    return Message(channel_id, log_time, data[content:end], publish_time, sequence)
+    return Message(channel_id, log_time, data[start + _MESSAGE.size : end], publish_time, sequence)
 
 
 def _check_size(chunk: Chunk) -> None:

@@ -85,6 +85,20 @@ class TrafficReader:
             yield from self._tail(expected)
         self.loss.truncated |= not self.end and self.info.get("format") != formats.TRAFFIC_FORMATS[0]
 
+    def messages_on(self, topics: Collection[str]) -> Iterator[TrafficMessage]:
+        """The readable messages on these topics, from the beginning: several times faster than all.
+
+        It tells nothing of what could not be read, and leaves :attr:`loss` and :attr:`end` as they are.
+        """
+        if read_tail(self.path):  # of a session that runs or was killed: what is new in it shows by the numbers of all
+            yield from (message for message in TrafficReader(self.path).messages() if message.topic in topics)
+            return
+        for path in segment_paths(self.path):
+            resumed = self._resumed if path == self.path else {}
+            for topic, message in SegmentMessages(path, Loss(), 0, resumed, topics):
+                if topic is not None and topic in topics:
+                    yield self._as_now(topic, message)
+
     def _tail(self, expected: int) -> Iterator[TrafficMessage]:
         """Of a recording that was cut off: the messages behind those of its file that are still in shared memory."""
         for last in read_tail(self.path):

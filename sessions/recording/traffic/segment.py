@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
@@ -28,13 +28,29 @@ UNREADABLE = (McapError, zstandard.ZstdError, struct.error, ValueError, Overflow
 
 
 class SegmentMessages:
-    """The messages of one file with their topics (None if unknown)."""
+    """The messages of one file with their topics (None if unknown).
 
-    def __init__(self, path: Path, loss: Loss, expected: int, resumed: dict[tuple[int, int], int | None]) -> None:
+    Args:
+        path: of the file.
+        loss: to which it adds.
+        expected: number of its first message.
+        resumed: see :class:`~sessions.recording.traffic.mcap_frames.Frames`.
+        topics: to read only these, in a fraction of the time; what is lost is then not known. None: all.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        loss: Loss,
+        expected: int,
+        resumed: dict[tuple[int, int], int | None],
+        topics: Collection[str] | None = None,
+    ) -> None:
         self.end: dict[str, str] = {}
         self.lost_at_end = 0
         """Messages lost behind the last one read, by summary or index: no gap in the numbering shows them."""
         self._path, self._loss, self._resumed = path, loss, resumed
+        self._wanted = topics
         self._topics: dict[int, str] = {}
         self._read: Counter[int] = Counter()
         self._indexed: Counter[int] = Counter()
@@ -95,9 +111,12 @@ class SegmentMessages:
         return []
 
     def _chunk(self, content: bytes) -> list[McapRecord]:
-        self._last_chunk = split_chunk(Chunk.read(ReadDataStream(BytesIO(content))))
+        self._last_chunk = split_chunk(Chunk.read(ReadDataStream(BytesIO(content))), self._is_wanted)
         self._chunk_is_read = True
         return self._last_chunk
+
+    def _is_wanted(self, channel: Channel) -> bool:
+        return self._wanted is None or channel.topic in self._wanted
 
     def _times_in_last_chunk(self, channel: int) -> list[int]:
         messages = (record for record in self._last_chunk if isinstance(record, Message))

@@ -41,7 +41,9 @@ def session_truth(session: Session, grasp_count: int, look: Look | None, traffic
         SessionError: the traffic file or a session event in it cannot be read.
         ShapeError: the mesh cannot be used.
     """
-    pictures = {} if look is None else marked_pictures((traffic or session.traffic()).messages())
+    pictures = {}
+    if look is not None:
+        pictures = marked_pictures(picture_messages(session) if traffic is None else traffic.messages())
     poses = [look(pictures[index]) if look and index in pictures else None for index in range(grasp_count)]
     return Truth(tuple(poses), read_truth_mesh(session))
 
@@ -49,6 +51,11 @@ def session_truth(session: Session, grasp_count: int, look: Look | None, traffic
 def read_truth_mesh(session: Session) -> trimesh.Trimesh | None:
     """The object's mesh, None if the session has none. Raises ShapeError."""
     return None if session.truth_mesh is None else read_mesh(session.truth_mesh)
+
+
+def picture_messages(session: Session) -> Iterator[TrafficMessage]:
+    """Of a session's recording, what :func:`marked_pictures` needs. Raises SessionError."""
+    return session.traffic().messages_on({received_topic(CAMERA_LINK), SESSION_EVENTS_TOPIC})
 
 
 def marked_pictures(messages: Iterable[TrafficMessage]) -> dict[int, Datagram]:
@@ -80,11 +87,10 @@ def _better(before: Datagram | None, now: Datagram) -> Datagram:
     return now if before is None or picture_of(now.payload) or not picture_of(before.payload) else before
 
 
-def camera_datagrams(messages: Iterable[TrafficMessage]) -> Iterator[Datagram]:
-    """Everything the camera sent."""
-    for message in messages:
-        if message.topic == received_topic(CAMERA_LINK):
-            yield Datagram(message.data, message.stamp_ns)
+def camera_datagrams(session: Session) -> Iterator[Datagram]:
+    """Everything the camera sent. Raises SessionError."""
+    for message in session.traffic().messages_on({received_topic(CAMERA_LINK)}):
+        yield Datagram(message.data, message.stamp_ns)
 
 
 class _GraspCounter:

@@ -47,6 +47,12 @@ def test_records_are_those_of_the_mcap_package(compression: str) -> None:
     assert [type(each) for each in split_chunk(whole)] == [Channel, Message, Message]
 
 
+def test_messages_of_unwanted_channels_are_left_out_and_those_of_undescribed_ones_are_not() -> None:
+    whole = chunk(FIRST + CHANNEL + EMPTY)
+    assert [type(each) for each in split_chunk(whole, lambda channel: channel.topic == "/other")] == [Message, Channel]
+    assert split_chunk(whole, lambda channel: channel.topic == "/link/hand/rx") == split_chunk(whole)
+
+
 def test_an_empty_chunk_has_no_records() -> None:
     assert split_chunk(chunk(b"")) == []
 

@@ -151,6 +151,30 @@ def test_damaged_bytes_never_give_wrong_messages_or_a_foreign_error(whole, tmp_p
         assert len(found) == 200 or reader.loss
 
 
+@QUICK
+@given(data=st.data())
+def test_messages_on_a_topic_are_those_among_all_whole_damaged_or_cut_off(whole, tmp_path_factory, data):
+    content = bytearray(whole[: data.draw(st.integers(0, len(whole)) | st.just(len(whole)))])
+    for position in data.draw(st.lists(st.integers(0, len(whole) - 1), max_size=2)):
+        if position < len(content):
+            content[position] ^= data.draw(st.integers(1, 255))
+    path = tmp_path_factory.getbasetemp() / "some-topics.mcap"
+    path.write_bytes(content)
+    topics = {"/link/hand/tx", "/link/of/nobody"}
+    with contextlib.suppress(SessionError):
+        everything = list(TrafficReader(path).messages())
+        chosen = list(TrafficReader(path).messages_on(topics))
+        assert chosen == [message for message in everything if message.topic in topics]
+
+
+def test_messages_on_a_topic_of_a_killed_writer_include_its_tail(tmp_path):
+    writer = record(tmp_path / "t.mcap", close=False)
+    reader = TrafficReader(tmp_path / "t.mcap")
+    chosen = list(reader.messages_on({"/link/hand/tx"}))
+    writer.close()
+    assert [int.from_bytes(message.data[:4], "little") for message in chosen] == list(range(1, 200, 3))
+
+
 def test_a_damaged_chunk_is_left_out_and_the_gap_is_counted(whole, tmp_path):
     ends = chunk_ends(whole)
     content = bytearray(whole)
