@@ -128,9 +128,11 @@ def test_a_table_in_a_pipe_has_one_line_a_row(inside):
     assert rows[1].rstrip().endswith("in real time")
 
 
-def test_a_terminal_without_a_width_still_shows_everything(tmp_path):
-    assert run("rig", "list", into=str(tmp_path / "usual")).returncode == 0
-    assert run("rig", "list", into=str(tmp_path / "none"), COLUMNS="0").returncode == 0
+def test_a_terminal_without_a_width_still_shows_everything(recorded, tmp_path):
+    words = ("session", "list", "--root", str(recorded.parent))
+    assert run(*words, into=str(tmp_path / "usual")).returncode == 0
+    assert run(*words, into=str(tmp_path / "none"), COLUMNS="0").returncode == 0
+    assert recorded.name in (tmp_path / "usual").read_text()
     assert (tmp_path / "none").read_text() == (tmp_path / "usual").read_text()
 
 

@@ -245,8 +245,10 @@ def test_a_rig_is_checked_device_by_device(inside):
     assert {"hand", "base", "camera", "fingertip FF", "fingertip TH"} <= {d["device"] for d in document["devices"]}
 
 
-def test_nothing_is_coloured_or_boxed_for_a_program_that_reads_along(tactile_lab):
-    assert "\x1b" not in tactile_lab("rig", "list").out
+def test_nothing_is_coloured_or_boxed_for_a_program_that_reads_along(tactile_lab, recorded):
+    listed = tactile_lab("session", "list", "--root", recorded.parent).out
+    assert recorded.name in listed
+    assert "\x1b" not in listed
 
 
 def test_a_folder_without_sessions_is_no_error(inside, tmp_path):

@@ -22,6 +22,7 @@ from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise, heavy_tailed_cost, heavy_tailed_weight
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
+from tactile_lab.slam.tracking.joint.low_discrepancy import sobol_points
 
 UNEXPLAINED_COST = 2.0
 """A contact in a hundred is wrong, and then anywhere within 10 cm with any normal, which costs 0. The remainder keeps
@@ -226,10 +227,7 @@ def _distinct(rows: Array, cost: Array, settings: ProposalSettings, space: PoseV
 
 @cache
 def _sobol_normals(count: int, size: int) -> Array:
-    from scipy.stats import qmc  # here: it takes a fifth of the time in which a session starts
-
-    exponent = int(np.ceil(np.log2(count)))
-    uniform = qmc.Sobol(size, scramble=True, rng=np.random.default_rng(0)).random_base2(exponent)[:count]
+    uniform = sobol_points(count, size, np.random.default_rng(0).spawn(1)[0])
     return np.asarray(ndtri(np.clip(uniform, 1e-6, 1 - 1e-6)))
 
 

@@ -163,6 +163,7 @@ def test_grasps_before_the_object_frame_have_no_pose() -> None:
     assert result.world_T_object[1] is not None
 
 
+@pytest.mark.long  # quicker: test_relocalization
 def test_a_grasp_that_finds_its_place_at_the_end_is_not_lost() -> None:
     carried = carried_off(simulate("triangle", 5, count=9), 6, Pose3(Rot3.Rz(1.0), np.array([0.1, 0.02, 0.0])))
     slam = TactileSlam(settings(lost_after=1))

@@ -72,7 +72,9 @@ def pdf_areas(content: bytes, height_mm: float) -> list[list[Array]]:
 
 
 @pytest.mark.parametrize(
-    "board", [CharucoBoard(), GridBoard(), Chessboard(), AprilGrid()], ids=lambda board: board.kind
+    "board",
+    [CharucoBoard(), GridBoard(), pytest.param(Chessboard(), marks=pytest.mark.long), AprilGrid()],
+    ids=lambda board: board.kind,
 )
 def test_a_board_is_read_whole_and_at_true_size_from_svg_and_pdf(board: AnyBoard) -> None:
     sheet = sheet_of([board])

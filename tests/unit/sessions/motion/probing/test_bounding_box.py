@@ -67,7 +67,7 @@ def test_only_the_top_is_felt_of_what_the_palm_passes_over_unless_the_sides_are_
     assert box.in_words().startswith("the object is 4")
 
 
-@pytest.mark.parametrize("enabled", [True, False])
+@pytest.mark.parametrize("enabled", [pytest.param(True, marks=pytest.mark.long), False])
 def test_what_the_palm_does_not_pass_over_is_felt_from_its_sides(enabled: bool) -> None:
     disc = Disc(np.array([0.006, -0.004]), radius_m=0.035, height_m=0.15)
     box = prober(DiscWorld(disc), ONE_LANE.model_copy(update={"enabled": enabled})).feel()

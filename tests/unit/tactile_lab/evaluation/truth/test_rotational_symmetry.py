@@ -46,6 +46,7 @@ def test_eighths_of_a_turn_leave_an_octagon_as_it_is_and_ninths_do_not() -> None
     assert found.order == 8
 
 
+@pytest.mark.long  # quicker: what turns leave an object as it is
 def test_a_dented_can_is_round(lab_data: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(DATA_VARIABLE, str(lab_data))
     assert symmetry_turns(solid("ycb:tomato_soup_can").mesh) == ANY_TURN

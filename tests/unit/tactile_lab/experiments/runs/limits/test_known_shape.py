@@ -29,6 +29,7 @@ def test_the_same_seed_gives_the_same() -> None:
     assert followed("l-block", 0) == first
 
 
+@pytest.mark.long  # quicker: slips of a centimetre
 def test_less_motion_is_followed_better() -> None:
     assert followed("l-block", 0, noise=5) < 0.6 * followed("l-block", 0)
 

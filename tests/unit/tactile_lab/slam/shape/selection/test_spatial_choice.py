@@ -60,6 +60,7 @@ def test_the_field_is_chosen_for_an_ellipsoid_and_is_not_widened_at_the_table() 
     assert mesh_errors(shape.mesh(), ellipsoid_mesh()).hausdorff_m < alone.hausdorff_m + 0.0005
 
 
+@pytest.mark.long  # quicker: the other choices
 def test_a_field_of_what_is_alike_along_edges_is_chosen_for_a_carton_with_bulging_sides() -> None:
     carton = cushion_mesh()
     field = field_on(carton, 70, seed=2)
@@ -94,6 +95,7 @@ def test_a_sharp_solid_that_fills_free_places_is_not_taken() -> None:
     assert best_shape(field_on(box_mesh(), 80, seed=0), free, floor_m=0.0).name == "standing gpis"
 
 
+@pytest.mark.long  # quicker: a foot that was not touched
 def test_walls_of_a_standing_field_reach_the_table_and_a_level_top_has_a_sharp_rim() -> None:
     field = field_on(cylinder_mesh(), 80, seed=1)
     standing = StandingField.fit(field, 0.0)
@@ -184,6 +186,7 @@ def rounded_box_mesh(edge_m: float = 0.012) -> trimesh.Trimesh:
     return mesh
 
 
+@pytest.mark.long  # quicker: a sharp solid that fills free places
 def test_faces_that_only_follow_their_own_contacts_are_not_taken() -> None:
     field = field_on(rounded_box_mesh(), 110, seed=1)
     faces = Polyhedron.fit(field)

@@ -89,6 +89,7 @@ def test_wrong_contacts_are_left_out_and_hardly_any_right_one(shape: str) -> Non
     assert wrong <= left_out <= wrong + 9
 
 
+@pytest.mark.long  # quicker: wrong contacts are left out
 def test_one_wrong_contact_does_not_hide_all_faces() -> None:
     data = planar_data.simulate("L", 7, outlier_share=0.1)  # 23 mm off, where the smooth field lets it pass
     slam = TactileSlam(SlamSettings(method="known-pose"), 0, known_poses=data.world_T_body)
