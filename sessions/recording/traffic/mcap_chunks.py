@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from functools import lru_cache
 from io import BytesIO
 
 import zstandard
@@ -19,6 +20,7 @@ from mcap.stream_reader import get_chunk_data_stream
 LARGEST_CHUNK_bytes = 16 << 20
 """A chunk is closed after 64 KiB: more is a picture. A small file may claim to hold gigabytes."""
 
+_KEPT_bytes = 4096
 _MESSAGE_OPCODE, _CHANNEL_OPCODE = int(Opcode.MESSAGE), int(Opcode.CHANNEL)
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
@@ -52,11 +54,24 @@ def split_chunk(chunk: Chunk, is_wanted: Callable[[Channel], bool] | None = None
             if not unwanted or data[start] | data[start + 1] << 8 not in unwanted:  # its channel
                 records.append(_message(data, start, position))
         elif opcode == _CHANNEL_OPCODE:
-            channel = Channel.read(ReadDataStream(BytesIO(data[start:position])))
+            channel = _channel(data[start:position])
             if is_wanted is not None and not is_wanted(channel):
                 unwanted.add(channel.id)
             records.append(channel)
     return records
+
+
+def _channel(content: bytes) -> Channel:
+    """A channel, as every chunk describes it again."""
+    return _known_channel(content) if len(content) <= _KEPT_bytes else _read_channel(content)
+
+
+def _read_channel(content: bytes) -> Channel:
+    channel: Channel = Channel.read(ReadDataStream(BytesIO(content)))
+    return channel
+
+
+_known_channel = lru_cache(maxsize=256)(_read_channel)
 
 
 def _message(data: bytes, start: int, end: int) -> Message:

@@ -43,6 +43,10 @@ def test_the_chi_squared_distribution_is_that_of_scipy(degrees: int) -> None:
 
 
 def test_a_session_starts_without_scipys_statistics() -> None:
-    code = "import sys, tactile_lab.workflow.running as _; print('scipy.stats' in sys.modules)"
+    code = (
+        "import sys, tactile_lab.workflow.running as _; "
+        "from tactile_lab.slam.tracking.joint.proposals import quasi_normal; quasi_normal(96, 6); "
+        "print('scipy.stats' in sys.modules)"
+    )
     ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ended.stdout == "False\n"
