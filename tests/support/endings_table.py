@@ -261,7 +261,7 @@ ENDINGS: dict[str, Ending] = {
     "in real time, devices on wires": Ending(rig=_WIRES),
     "the same on a disk of 100 kB/s": Ending(prepare=_bad_disk(_take_time), rig=_WIRES),
     "the same on a disk that goes away": Ending(prepare=_bad_disk(_go_away), rig=_WIRES),
-    "the same on a full disk": Ending(disk="size=5000k", rig=_WIRES),
+    "the same on a full disk": Ending(disk="size=2500k", rig=_WIRES),
 }
 
 
