@@ -1,7 +1,8 @@
 """Feasible grasps of the hand around the estimated object, and why others are infeasible.
 
 A candidate is a grasp frame (every yaw of the arm's window, shifts across it), a closing, a height of the fingertips
-and, where a surface is wanted, perhaps a tap on the top before it, or a hand that leans to one side. Its expected
+and, where a surface is wanted, perhaps a tap on the top before it (in the middle, and near the ends of a long object),
+or a hand that leans to one side. Its expected
 contacts follow from the kinematics: round fingertips on the closing's lines against the estimated surface. A grasp is
 infeasible if the arm cannot reach it, if the open fingers would land on the object or the palm rest on it, or if the
 hand has just landed there. A grasp that would push the object with a link without sensors is marked.
@@ -38,6 +39,9 @@ HasRoom: TypeAlias = Callable[[GraspPlan], bool]
 
 _TAP_FROM_m = 0.025
 """Height above the object's top at which the rays of a tap start."""
+
+_TAP_HALF_m = 0.025
+"""From the middle of a tap to the edge of the top: its fingertips stand in a circle of 30 mm, 10 mm from the edge."""
 
 _PALM_THICKNESS_m = 0.030
 """Extent of the palm below its origin, which the object's top must not reach."""
@@ -116,7 +120,7 @@ def offer(
         here: present pose of the hand, for the travel time; None if unknown.
         has_room: further obstacles of a plan (such as a place where the hand has just landed).
     """
-    plans = list(_plans(limits, np.asarray(world_T_object.transformFrom(known.centre_m))))
+    plans = list(_plans(limits, known, world_T_object))
     ruled_out: Counter[str] = Counter()
     tests: list[tuple[str, Callable[[Sequence[GraspPlan]], Verdicts]]] = [
         (OUT_OF_REACH, lambda some: np.array([_reachable(plan, limits) for plan in some])),
@@ -137,10 +141,12 @@ def offer(
     return Offer(usable, dict(ruled_out))
 
 
-def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
-    """Every combination; a tap only with the hand in the middle and at one height, as the others would be equal."""
+def _plans(limits: HandLimits, known: KnownShape, world_T_object: Pose2) -> Iterator[GraspPlan]:
+    """Every combination; taps only at one height, as the others would be equal."""
     shifts, heights = limits.exploration.shifts_m, limits.heights_m
+    centre_world_m = np.asarray(world_T_object.transformFrom(known.centre_m))
     for yaw in np.linspace(*limits.plan.yaw_window_rad, limits.exploration.yaws):
+        tapped = _tapped_shifts(limits, known, float(yaw - world_T_object.theta()))
         for shift in shifts:
             x, y = centre_world_m + planar_rotation(float(yaw)) @ np.array([0.0, shift])
             frame = GraspFrame(float(x), float(y), float(yaw))
@@ -148,11 +154,30 @@ def _plans(limits: HandLimits, centre_world_m: Array) -> Iterator[GraspPlan]:
                 for height_m in heights:
                     plan = GraspPlan(frame, name, height_m)
                     yield plan
-                    if limits.dimension == 3 and shift == shifts[len(shifts) // 2] and height_m == heights[0]:
+                    if shift in tapped and height_m == heights[0]:
                         yield replace(plan, tap=True)
             for name in limits.side_closings:
                 for height_m in limits.exploration.side_heights_m:
                     yield GraspPlan(frame, name, height_m)
+
+
+def _tapped_shifts(limits: HandLimits, known: KnownShape, yaw_rad: float) -> set[float]:
+    """Where the hand taps: in the middle, and as far aside as it shifts where the object is longer than that.
+
+    Args:
+        limits: of the hand.
+        known: the object's shape as estimated.
+        yaw_rad: of the hand in the object frame.
+    """
+    if limits.dimension == 2:
+        return set()
+    shifts = limits.exploration.shifts_m
+    tapped = {shifts[len(shifts) // 2]}
+    if known.surface is None:
+        return tapped
+    aside_m = (known.surface.points_m[:, :2] - known.centre_m) @ planar_rotation(yaw_rad)[:, 1]
+    ends = {end for end in (min(shifts), max(shifts)) if (np.sign(end) * aside_m).max() > abs(end) + _TAP_HALF_m}
+    return tapped | ends
 
 
 def table_of(plan: GraspPlan, hand: HandShape) -> Closing:

@@ -150,3 +150,15 @@ def test_time_grows_with_the_way_to_the_grasp() -> None:
     near = grasp_time_s(plan, CycleSettings(), GraspFrame(0.0, 0.0, 0.9))
     far = grasp_time_s(plan, CycleSettings(), GraspFrame(0.0, 0.0, -1.2))
     assert far - near == pytest.approx((2.2 - 0.1) / 1.5)
+
+
+@pytest.mark.parametrize(("half_length_m", "ends"), [(0.050, set()), (0.070, {-1.0, 1.0})])
+def test_a_long_object_is_tapped_near_its_ends_too(half_length_m: float, ends: set[float]) -> None:
+    assert SOLID_BOX.surface is not None
+    stretched_m = SOLID_BOX.surface.points_m * [half_length_m / 0.05, 1.0, 1.0]
+    long = replace(SOLID_BOX, surface=replace(SOLID_BOX.surface, points_m=stretched_m))
+    across = limits(3, plan=PlanSettings(yaw_window_rad=(1.50, 1.57)))  # the hand's fingers side by side along it
+    taps = [one.plan for one in offer(across, long, Pose2()).usable if one.plan.tap]
+    aside_m = np.array([plan.frame.x_m - long.centre_m[0] for plan in taps])
+    assert np.abs(aside_m).min() < 0.001
+    assert {float(np.sign(place)) for place in aside_m if abs(place) > 0.03} == ends
