@@ -87,17 +87,14 @@ class StandingPlanner:
         return None if best is None else best.plan
 
     def on_grasp(self, grasp: Grasp) -> None:
-        """Take note of contacts, and of where they were expected.
-
-        A finger that met something elsewhere, as it passed the box above a shoulder and met a neck, has looked there
-        too: else the same grasp would stay the most promising one.
-        """
+        """Take note of contacts, and of where none was."""
         self.felt.on_grasp(grasp)
         if (done := self._current) is None:
             return
         self._touches += done.plan.only_touch
-        self._met_little = not done.plan.only_touch and len(grasp.touching) < len(done.touches) / 2
-        self.felt.on_looked(list(done.touches.values()))
+        touched = frozenset() if done.plan.only_touch else grasp.touching
+        self._met_little = not done.plan.only_touch and len(touched) < len(done.touches) / 2
+        self.felt.on_looked([place for finger, place in done.touches.items() if finger not in touched])
 
     def on_estimate(self, is_placed: bool) -> None:
         """Take note whether the contacts of the last grasp fit what was felt before."""

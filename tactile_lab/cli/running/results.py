@@ -25,6 +25,9 @@ FILES = (
     ("report.html", "report"),
 )
 
+COMPLETE = ("complete", "")
+"""Statuses of estimates with nothing left to find; without an evaluation there is none."""
+
 
 def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] | None = None) -> None:
     """Show the outcome, the evaluation and the files, and raise the exit code (see :mod:`cli.main`).
@@ -32,7 +35,7 @@ def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] 
     With ``as_json`` there is always one document: the evaluation (followed by ``extra``), or
     ``{"error": ..., "session": ...}`` when there is none.
     """
-    _tell_outcome(finished.outcome)
+    _tell_outcome(finished.outcome, finished.evaluation.status if finished.evaluation else "")
     if as_json:
         emit_json({**_document(finished), **(extra or {})})
     elif finished.evaluation is not None:
@@ -55,16 +58,21 @@ def _document(finished: FinishedSession) -> dict[str, Any]:
     return {"error": finished.problem, "session": str(finished.folder)}
 
 
-def _tell_outcome(outcome: SessionOutcome | None) -> None:
+def _tell_outcome(outcome: SessionOutcome | None, status: str) -> None:
+    """How the session ended; "complete" only where the estimate is too, however many grasps were done."""
     if outcome is None:
         return
     if outcome.error is not None:
         complain(outcome.reason)
     elif outcome.ending is Ending.COMPLETE:
-        say(f"session complete: {outcome.reason}", "bold")
+        say(f"session complete: {outcome.reason}" if status in COMPLETE else _unfinished(outcome, status), "bold")
     else:
         what = "object lost: " if outcome.ending is Ending.OBJECT_LOST else ""
         warn(f"session ended early: {what}{outcome.reason}")
+
+
+def _unfinished(outcome: SessionOutcome, status: str) -> str:
+    return f"session ended as asked: {outcome.reason}; the estimate is {status}, see the warnings"
 
 
 def _tell_files(finished: FinishedSession) -> None:

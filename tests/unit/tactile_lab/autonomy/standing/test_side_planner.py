@@ -172,13 +172,3 @@ def test_an_object_that_stands_tall_is_never_carried() -> None:
     chosen.on_bounding_box(box())
     plan = chosen.plan(0)
     assert not chosen.on_grasp(grasp(np.array([[0.04, 0.0, 0.05]]), ["FF"]), plan).moves
-
-
-def test_grasps_that_met_a_neck_within_the_box_are_not_chosen_again() -> None:
-    """Fingers that close on something thinner have looked at the box's sides all the same."""
-    above, done = planner(box()), list[tuple[str, float, float]]()
-    while (plan := above.plan()) is not None and len(done) < 12:
-        done.append((plan.closing, round(plan.height_m, 3), round(plan.frame.yaw_rad, 2)))
-        neck = {f"{plan.closing} {at}": np.array([*above.middle_m, 0.02 * at]) for at in range(1, 4)}
-        above.on_grasp(grasp(np.array(list(neck.values())), ["FF", "MF", "TH"]))
-    assert len(done) == len(set(done))
