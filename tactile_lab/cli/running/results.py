@@ -35,7 +35,7 @@ def conclude(finished: FinishedSession, as_json: bool, extra: Mapping[str, Any] 
     With ``as_json`` there is always one document: the evaluation (followed by ``extra``), or
     ``{"error": ..., "session": ...}`` when there is none.
     """
-    _tell_outcome(finished.outcome, finished.evaluation.status if finished.evaluation else "")
+    tell_outcome(finished.outcome, finished.evaluation.status if finished.evaluation else "")
     if as_json:
         emit_json({**_document(finished), **(extra or {})})
     elif finished.evaluation is not None:
@@ -58,7 +58,7 @@ def _document(finished: FinishedSession) -> dict[str, Any]:
     return {"error": finished.problem, "session": str(finished.folder)}
 
 
-def _tell_outcome(outcome: SessionOutcome | None, status: str) -> None:
+def tell_outcome(outcome: SessionOutcome | None, status: str) -> None:
     """How the session ended; "complete" only where the estimate is too, however many grasps were done."""
     if outcome is None:
         return
