@@ -56,5 +56,9 @@ class SharedErrors:
             return np.zeros((len(self.fingers), 0))
         return np.asarray((self.fingers[:, None] == np.unique(self.fingers)) * self.sigma_m[:, None])
 
+    def displacements_each_m(self) -> Array:
+        """The same as if each contact had such an error of its own, shape (n, n)."""
+        return np.diag(self.sigma_m) if self.sigma_m.any() else np.zeros((len(self.fingers), 0))
+
 
 NO_SHARED_ERRORS = SharedErrors(np.empty(0, dtype=np.str_), np.empty(0))

@@ -32,12 +32,14 @@ class FacetCertainty:
         faces_by_poses: derivatives of each face's tilt and offset by those poses, shape (s d, p).
         faces_by_fingers: change of each face's tilt and offset by one standard deviation of the error that contacts of
             one finger share, while the poses adapt, shape (s d, fingers).
+        faces_by_contacts: the same if each contact had such an error of its own, shape (s d, n).
     """
 
     faces: FlatFaces
     information_of_poses: Array
     faces_by_poses: Array
     faces_by_fingers: Array
+    faces_by_contacts: Array
 
     @classmethod
     def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
@@ -53,8 +55,10 @@ class FacetCertainty:
         free = (len(rows) - 1) * contact_map.space.size
         by_poses = -np.linalg.solve(information[free:, free:], information[free:, :free])
         of_poses = information[:free, :free] + information[:free, free:] @ by_poses
-        by_fingers = smoother.response(rows, faces, contact_map.contacts_world.shared.displacements_m())[free:]
-        return cls(faces, np.asarray((of_poses + of_poses.T) / 2), np.asarray(by_poses), by_fingers)
+        shared = contact_map.contacts_world.shared
+        by_fingers = smoother.response(rows, faces, shared.displacements_m())[free:]
+        by_contacts = smoother.response(rows, faces, shared.displacements_each_m())[free:]
+        return cls(faces, np.asarray((of_poses + of_poses.T) / 2), np.asarray(by_poses), by_fingers, by_contacts)
 
     def surface_change(self, places_m: Array, normals: Array) -> Array:
         """Derivatives of points on the faces, shape (q, d), along their normals by the poses, shape (q, p)."""
@@ -63,6 +67,10 @@ class FacetCertainty:
     def shared_change(self, places_m: Array, normals: Array) -> Array:
         """Displacement of such points by one standard deviation of each finger's error, shape (q, fingers)."""
         return np.asarray(self._surface_by_faces(places_m, normals) @ self.faces_by_fingers)
+
+    def shared_change_each(self, places_m: Array, normals: Array) -> Array:
+        """The same if each contact had such an error of its own, shape (q, n)."""
+        return np.asarray(self._surface_by_faces(places_m, normals) @ self.faces_by_contacts)
 
     def _surface_by_faces(self, places_m: Array, normals: Array) -> Array:
         """Derivatives of points on the faces along their normals by each face's tilt and offset, shape (q, s d)."""

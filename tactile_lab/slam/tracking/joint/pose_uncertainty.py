@@ -10,7 +10,8 @@ A motion of all contacts as one body changes the place of the shape and not the 
 result is the uncertainty of the surface after the best rigid alignment.
 
 Errors that all contacts of one finger share (:mod:`shared_errors`) are propagated in the same way, through the poses
-and the faces that adapt to them.
+and the faces that adapt to them. A contact's variance, which weighs it, contains them too: what they add to the surface
+as if drawn anew for each contact is taken away, so that they count once (decision 74).
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ _Extracted = TypeVar("_Extracted", Contour, SurfaceMesh)
 def propagate_pose_uncertainty(
     extracted: _Extracted, shape: FittedShape, contact_map: ContactMap, noise: MotionNoise
 ) -> _Extracted:
-    """An outline or surface with two more parts in its sigma: the poses', and what contacts of one finger share.
+    """An outline or surface with two more parts in its sigma: the poses', and what contacts of one finger share, which
+    is counted once.
 
     Args:
         extracted: of the shape.
@@ -56,10 +58,13 @@ def propagate_pose_uncertainty(
     axes = slice(0, used.dimension)
     changes = _changes(used, noise, places_m[:, axes], normals[:, axes], faceted=_has_flat_faces(shape))
     on_table = contact_map.space is PLANAR
-    by_poses, by_fingers = (_variance(_reshape(each, places_m, normals, on_table=on_table)) for each in changes)
+    parts = (_variance(_reshape(each, places_m, normals, on_table=on_table)) for each in changes)
+    by_poses, by_fingers, as_if_anew = parts
+    anew = extracted.sigma_m**2 + by_poses
+    least = _least_own_share(used.contacts_world) * anew
     return replace(
         extracted,
-        sigma_m=np.sqrt(extracted.sigma_m**2 + by_poses + by_fingers),
+        sigma_m=np.sqrt(np.maximum(anew - as_if_anew, least) + by_fingers),
         shared_sigma_m=float(np.sqrt(np.median(by_fingers))),
     )
 
@@ -68,11 +73,17 @@ def _variance(change: Array) -> Array:
     return np.asarray(np.einsum("qm,qm->q", change, change))
 
 
+def _least_own_share(contacts: ContactSet) -> float:
+    """Smallest part of a contact's variance that is drawn anew: that of the surface by contacts cannot shrink below."""
+    shared = contacts.shared.of_count(len(contacts)).sigma_m ** 2
+    return float(np.clip(1 - shared / contacts.point_sigma_m**2, 0.0, 1.0).min())
+
+
 def _changes(
     contact_map: ContactMap, noise: MotionNoise, places_m: Array, normals: Array, *, faceted: bool
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Displacements of a surface along its normals by independent standard normal variables, shapes (q, m): by the
-    poses, and by what contacts of one finger share.
+    poses, by what contacts of one finger share, and by the same if it were drawn anew for each contact.
 
     Args:
         contact_map: see above, contacts in the plane or in space.
@@ -90,20 +101,24 @@ def _changes(
         evidence = PoseEvidence(contact_map, noise)
         information, change = evidence.information(contact_map.rows), evidence.field_change(contact_map.rows, places_m)
     root = np.linalg.inv(np.linalg.cholesky(information)).T
-    shared = _shared_change(contact_map, certainty, places_m, normals)
+    shared, each = _shared_changes(contact_map, certainty, places_m, normals)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(change @ root * lengths), np.asarray(shared * lengths)
+    return np.asarray(change @ root * lengths), np.asarray(shared * lengths), np.asarray(each * lengths)
 
 
-def _shared_change(contact_map: ContactMap, certainty: FacetCertainty | None, places_m: Array, normals: Array) -> Array:
-    """Displacement of a surface by what the contacts of each finger share, shape (q, fingers).
+def _shared_changes(
+    contact_map: ContactMap, certainty: FacetCertainty | None, places_m: Array, normals: Array
+) -> tuple[Array, Array]:
+    """Displacement of a surface by what the contacts of each finger share, shape (q, fingers), and by the same if each
+    contact had it by itself, shape (q, n).
 
     Where no faces say how the poses adapt, each finger counts by its number of contacts all over the object.
     """
     if certainty is not None:
-        return certainty.shared_change(places_m, normals)
-    alike = contact_map.contacts_world.shared.displacements_m().mean(axis=0)
-    return np.tile(alike, (len(places_m), 1))
+        return certainty.shared_change(places_m, normals), certainty.shared_change_each(places_m, normals)
+    shared = contact_map.contacts_world.shared
+    alike = shared.displacements_m().mean(axis=0), shared.displacements_each_m().mean(axis=0)
+    return np.tile(alike[0], (len(places_m), 1)), np.tile(alike[1], (len(places_m), 1))
 
 
 def _reshape(change: Array, places_m: Array, normals: Array, *, on_table: bool) -> Array:

@@ -77,16 +77,39 @@ def test_more_grasps_reduce_the_sensors_noise_and_not_what_a_finger_shares(known
     assert added_m(with_shared_errors(known, 0.0)) == 0.0
 
 
-def test_the_outline_is_stated_less_certain_by_what_fingers_share(known: ContactMap) -> None:
+def test_what_fingers_share_is_counted_once(known: ContactMap) -> None:
     shape = best_shape(known.fit())
     contour = shape.contour()
-    with_poses = propagate_pose_uncertainty(contour, shape, with_shared_errors(known, 0.0), NOISE)
-    with_both = propagate_pose_uncertainty(contour, shape, known, NOISE)
-    assert np.all(with_poses.sigma_m >= contour.sigma_m)
-    added_m = np.sqrt(np.median(with_both.sigma_m**2 - with_poses.sigma_m**2))
-    assert 0.2 * SHARED_m < added_m < SHARED_m
-    assert with_both.shared_sigma_m == pytest.approx(added_m, rel=0.05)
-    assert with_poses.shared_sigma_m == 0.0
+    without = propagate_pose_uncertainty(contour, shape, with_shared_errors(known, 0.0), NOISE)
+    once = propagate_pose_uncertainty(contour, shape, known, NOISE)
+    assert without.shared_sigma_m == 0.0
+    assert np.all(without.sigma_m >= contour.sigma_m)
+    assert 0.2 * SHARED_m < once.shared_sigma_m < SHARED_m
+    own = once.sigma_m**2 - once.shared_sigma_m**2
+    assert 0.2 * np.median(without.sigma_m**2) < np.median(own) < 0.9 * np.median(without.sigma_m**2)
+
+
+def test_an_error_that_each_contact_has_by_itself_is_that_of_its_variance(known: ContactMap) -> None:
+    """Every contact by a finger of its own: the shared error is drawn anew at each, and sigma is as without it."""
+    shape = best_shape(known.fit())
+    contour, count = shape.contour(), 0
+    placed = []
+    for grasp in known.placed:
+        fingers = np.array([f"{count + each:03}" for each in range(len(grasp.contacts_world))])
+        count += len(fingers)
+        shared = SharedErrors(fingers, np.full(len(fingers), SHARED_m))
+        placed.append(replace(grasp, contacts_world=replace(grasp.contacts_world, shared=shared)))
+    apart = propagate_pose_uncertainty(contour, shape, replace(known, placed=tuple(placed)), NOISE)
+    without = propagate_pose_uncertainty(contour, shape, with_shared_errors(known, 0.0), NOISE)
+    np.testing.assert_allclose(apart.sigma_m, without.sigma_m, rtol=1e-6)
+
+
+@pytest.mark.parametrize("shared_m", [0.001, 0.002], ids=["all of it", "more than all"])
+def test_sigma_stays_positive_where_contacts_state_nothing_of_their_own(known: ContactMap, shared_m: float) -> None:
+    shape = best_shape(known.fit())
+    stated = propagate_pose_uncertainty(shape.contour(), shape, with_shared_errors(known, shared_m), NOISE)
+    assert np.isfinite(stated.sigma_m).all()
+    assert stated.sigma_m.min() > 0
 
 
 def test_contacts_keep_their_fingers_where_they_are_selected_moved_and_gathered() -> None:
