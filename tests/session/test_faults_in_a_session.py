@@ -18,7 +18,7 @@ from tests.support.session_sweep import run_with
     ],
 )
 def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(tmp_path, transport, fault, words):
-    swept = run_with("sim", {transport: fault}, tmp_path, at_s=0.5)
+    swept = run_with("sim", {transport: fault}, tmp_path, phase="bounding box")
     swept.check(transport, fault)
     assert words in swept.ended
     assert swept.replay.startswith("read")

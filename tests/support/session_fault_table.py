@@ -14,7 +14,6 @@ from tests.support.session_sweep import (
     BLIND,
     LAYOUTS,
     LONGEST_s,
-    STRIKES_AT_s,
     Swept,
     UNTIL_IT_MOVES_s,
     faults,
@@ -30,8 +29,8 @@ OUTLINE = Outline(
     "session-faults",
     "Every fault of every link in the middle of a session.",
     ("python -m tests.support.session_fault_table --store",),
-    f"A session of one grasp on the box, seed 1; faults from second {STRIKES_AT_s:g} on: the fingers are closing; the "
-    f"first picture comes later. A session ends in order within the time stated ({TIMES}), or goes on. In both cases "
+    "A session of one grasp on the box, seed 1; faults begin when the fingers first close; the first picture comes "
+    f"later. A session ends in order within the time stated ({TIMES}), or goes on. In both cases "
     "its recording was then read without loss and replayed: results identical byte for byte, where the session came "
     "to any. Told: what its events and its record say, with the figures at the end.",
     ("Rig", "Link", "Fault", "Struck", "The session", "Told and stored", "Replay"),

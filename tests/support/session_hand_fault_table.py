@@ -11,7 +11,6 @@ import tempfile
 from pathlib import Path
 
 from tests.support.session_hand_faults import FAULTS, CYCLE_s, SessionHandFault, SessionHandOutcome, run_fault
-from tests.support.session_sweep import STRIKES_AT_s
 from tests.support.stored_table import GrowingTable, Outline, parser
 
 OUTLINE = Outline(
@@ -19,7 +18,7 @@ OUTLINE = Outline(
     "Every fault of the hand itself in the middle of a session.",
     ("python -m tests.support.session_hand_fault_table --store",),
     f"A session of one grasp on the simulated rig, the box, seed 1, virtual time, cycles of {1000 * CYCLE_s:g} ms. "
-    f"Faults of FFJ3, of the motors or of the link from second {STRIKES_AT_s:g} on, while the fingers close. Seen "
+    "Faults of FFJ3, of the motors or of the link from when the fingers first close. Seen "
     "after: the time that the fault's rule waits (docs/failures.md) and until the polling comes to it. Last demand: "
     "from the fault until the last demand above zero; for the frozen sensor from when its joint is driven, which "
     "is seconds later. Last joint turned: by more than 0.02 rad/s.",

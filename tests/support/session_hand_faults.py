@@ -23,11 +23,11 @@ from drivers.shadow.protocol.palm_images import PALMS
 from drivers.simulation.devices.motor_bank import MotorBank
 from drivers.simulation.devices.palm_emulator import PalmEmulator
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending
 from tactile_lab.rigs import laboratory
 from tactile_lab.workflow.running import SessionRequest, run_session
-from tests.support.session_sweep import STRIKES_AT_s
+from tests.support.at_phase import At
+from tests.support.session_sweep import STRIKES_AT
 
 CYCLE_s = 0.01
 """Of the session, and of the hand in it."""
@@ -42,7 +42,7 @@ class WatchedHand:
 
     Attributes:
         palm, motors: the far end.
-        fault: begins at :data:`STRIKES_AT_s`.
+        fault: begins with :meth:`begin`.
         driven_ns: when a demand above zero was last sent.
         eased_ns: when FFJ3 last had a smaller demand than the one at which it has to move.
         turned_ns: when a joint last turned.
@@ -65,6 +65,11 @@ class WatchedHand:
     def close(self) -> None:
         self._transport.close()
 
+    def begin(self) -> None:
+        """Begin the fault."""
+        self.begun_ns = self._world.clock.now_ns()
+        self.fault.inject(self)
+
     @property
     def since_s(self) -> float:
         """Since the fault; negative before."""
@@ -77,9 +82,6 @@ class WatchedHand:
 
     def send(self, payload: bytes) -> None:
         now_ns = self._world.clock.now_ns()
-        if self.begun_ns is None and now_ns >= STRIKES_AT_s * NANOSECONDS:
-            self.begun_ns = now_ns
-            self.fault.inject(self)
         if self.begun_ns is not None:
             self.sent += 1
             demands = PALMS["0220"].decode_command(payload).motor_data
@@ -205,7 +207,8 @@ def run_fault(fault: SessionHandFault, root: Path) -> SessionHandOutcome:
 
     with patch.object(laboratory, "simulated_world", world_with_fault):
         try:
-            outcome = run_session(SessionRequest("sim", "box-10x6x4", root, seed=1, grasps=1), NullProgress()).outcome
+            closing = At(STRIKES_AT, lambda: watched[-1].begin())
+            outcome = run_session(SessionRequest("sim", "box-10x6x4", root, seed=1, grasps=1), closing).outcome
             ended = "" if outcome.ending is Ending.COMPLETE else outcome.reason
         except TactileLabError as stopped:
             ended = str(stopped)

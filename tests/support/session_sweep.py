@@ -1,6 +1,6 @@
 """Wire faults in the middle of a session: does it end properly, or go on with the fault reported and stored?
 
-A session of one grasp runs on a simulated rig, in virtual time. From the middle of the closing on, one of its
+A session of one grasp runs on a simulated rig, in virtual time. From when the fingers first close, one of its
 transports has one fault (:mod:`tests.support.faults`, with the message layouts of the drivers' own sweeps). Any
 exception other than the program's own errors ends the sweep. A transport that is read too often means that the session
 hangs.
@@ -9,9 +9,10 @@ hangs.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from unittest.mock import patch
 
@@ -19,7 +20,6 @@ from drivers.core.clock import NANOSECONDS, Clock
 from drivers.core.errors import TactileLabError
 from drivers.core.transports import Datagram, Transport
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending
 from sessions.perception.replay import Replay
 from sessions.recording.session import Session
@@ -30,6 +30,7 @@ from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.workflow.finishing import differing_files, has_results
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
 from tactile_lab.workflow.running import SessionRequest, run_session
+from tests.support.at_phase import At
 from tests.support.faults import CounterWrap, Fault, FaultyTransport, MessageLayout, When, standard_faults
 from tests.unit.drivers.ati.test_nano17_sweep import TestNetBox
 from tests.unit.drivers.positioner.test_positioner_sweep import TestPositioner
@@ -65,8 +66,8 @@ BLIND: dict[str, dict[str, dict[str, str]]] = {
 }
 """Faults that devices cannot detect, and why, by rig and transport."""
 
-STRIKES_AT_s = 7.0
-"""When the faults strike: in a session of one grasp the fingers are closing then."""
+STRIKES_AT = "close"
+"""The phase of the session with which faults begin: the fingers close on the object."""
 
 LONGEST_s = {"hand": 3.0, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
 """Longest time from the fault to the session's end, if it ends: 2 s in which a hand may come back, ten lost cycles of
@@ -81,23 +82,22 @@ HANGS_AFTER = 60_000
 """Limit for the readings of one transport; a session of one grasp needs some thousand."""
 
 
-class TimedFault(FaultyTransport):
-    """A fault that strikes at a time, not at a number of messages.
+class ArmedFault(FaultyTransport):
+    """A fault that strikes once it is armed, not at a number of messages.
 
     Attributes:
         struck_ns: when it first struck.
     """
 
-    def __init__(self, transport: Transport, clock: Clock, fault: Fault, when: When, at_s: float) -> None:
+    def __init__(self, transport: Transport, clock: Clock, fault: Fault, when: When) -> None:
         super().__init__(transport, fault, replace(when, first=0))
-        self._clock, self._readings, self._at_ns = clock, 0, at_s * NANOSECONDS
+        self._clock, self._readings = clock, 0
         self.struck_ns: int | None = None
         self.armed = isinstance(fault, CounterWrap)  # its counters are changed from the first message on
 
     def receive(self) -> list[Datagram]:
         self._readings += 1
         assert self._readings < HANGS_AFTER, f"{self.name}: the session hangs"
-        self.armed = self.armed or self._clock.now_ns() >= self._at_ns
         try:
             return super().receive()
         finally:
@@ -139,16 +139,17 @@ def faults(rig: str) -> Iterator[tuple[str, str]]:
             yield transport, name
 
 
-def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES_AT_s) -> Swept:
-    """Run a session in which transports have faults, by name, from a given time on, and check everything it recorded.
+def run_with(rig: str, faulty: dict[str, str], root: Path, phase: str = STRIKES_AT) -> Swept:
+    """Run a session in which transports have faults, by name, from a phase of it on, and check everything it recorded.
 
     Raises:
         AssertionError: it hung, or its recording cannot be read or replayed.
     """
-    transports: dict[str, TimedFault] = {}
-    with _faulty_world(rig, faulty, transports, at_s):
+    transports: dict[str, ArmedFault] = {}
+    with _faulty_world(rig, faulty, transports):
         try:
-            finished = run_session(SessionRequest(rig, "box-10x6x4", root, seed=1, grasps=1), NullProgress())
+            progress = At(phase, partial(_arm, transports))
+            finished = run_session(SessionRequest(rig, "box-10x6x4", root, seed=1, grasps=1), progress)
             folder, outcome, error = finished.folder, finished.outcome, None
         except TactileLabError as stopped:  # while connecting or closing; the folder tells
             folder, outcome, error = max(root.iterdir()), None, stopped
@@ -170,8 +171,13 @@ def run_with(rig: str, faulty: dict[str, str], root: Path, at_s: float = STRIKES
     )
 
 
+def _arm(transports: Mapping[str, ArmedFault]) -> None:
+    for transport in transports.values():
+        transport.armed = True
+
+
 @contextmanager
-def _faulty_world(rig: str, faulty: dict[str, str], transports: dict[str, TimedFault], at_s: float) -> Iterator[None]:
+def _faulty_world(rig: str, faulty: dict[str, str], transports: dict[str, ArmedFault]) -> Iterator[None]:
     """Give the simulated rigs of this process faulty transports within this context."""
     build = laboratory.simulated_world
 
@@ -180,7 +186,7 @@ def _faulty_world(rig: str, faulty: dict[str, str], transports: dict[str, TimedF
         given = world.transports()
         for name, fault_name in faulty.items():
             fault, when = standard_faults(LAYOUTS[rig][name])[fault_name]
-            transports[name] = TimedFault(given[name], world.clock, fault, when, at_s)
+            transports[name] = ArmedFault(given[name], world.clock, fault, when)
         world.transports = lambda: {**given, **transports}  # type: ignore[method-assign]
         return world
 

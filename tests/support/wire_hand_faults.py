@@ -34,7 +34,8 @@ from sessions.recording.traffic.reader import TrafficMessage
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.rigs.description import Rig
 from tactile_lab.rigs.laboratory import WiredLaboratory
-from tests.support.wire_sessions import At, emulated_laboratory, run
+from tests.support.at_phase import At
+from tests.support.wire_sessions import emulated_laboratory, run
 
 _FFJ3, _CHANNEL = 1, 2  # the motor of FFJ3 and the channel of its sensor
 _MUST_MOVE = SensorLimits().frozen_share * HandSettings().gains.of("FFJ3").max_pwm

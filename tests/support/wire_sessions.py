@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from drivers.core.contacts import Grasp
 from drivers.emulators.laboratory.emulated_laboratory import EmulatedLaboratory
 from drivers.shadow.protocol.palm_images import PALMS
-from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import SessionOutcome
 from sessions.perception.event_outcomes import TareReport
 from sessions.perception.replay import Replay
@@ -22,20 +19,7 @@ from tactile_lab.rigs.laboratory import WiredLaboratory
 from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow import running
 from tactile_lab.workflow.attending import Attendance
-
-
-@dataclass
-class At(NullProgress):
-    """Does something once, when a phase first begins."""
-
-    phase_name: str = ""
-    act: Callable[[], None] = lambda: None
-    told_of: list[str] = field(default_factory=list)
-
-    def phase(self, number: int, name: str) -> None:
-        if name == self.phase_name and name not in self.told_of:
-            self.act()
-        self.told_of.append(name)
+from tests.support.at_phase import At
 
 
 def emulated_laboratory(laboratory: WiredLaboratory) -> EmulatedLaboratory:

@@ -20,8 +20,9 @@ from sessions.recording.traffic import schemas
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import WiredLaboratory, open_laboratory
 from tactile_lab.workflow.attending import Attendance
+from tests.support.at_phase import At
 from tests.support.wire_rig import wire_rig
-from tests.support.wire_sessions import At, check_ended_in_order, emulated_laboratory, run
+from tests.support.wire_sessions import check_ended_in_order, emulated_laboratory, run
 
 pytestmark = [
     pytest.mark.long,

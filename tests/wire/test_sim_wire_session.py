@@ -26,9 +26,10 @@ from tactile_lab.rigs.description import Rig, load_rig, rig_of_session
 from tactile_lab.rigs.laboratory import WiredLaboratory, open_laboratory
 from tactile_lab.workflow import running
 from tactile_lab.workflow.attending import roles_for
+from tests.support.at_phase import At
 from tests.support.wire_hand_faults import HAND_FAULTS, run_fault
 from tests.support.wire_rig import wire_rig
-from tests.support.wire_sessions import At, check_ended_in_order, emulated_laboratory, run
+from tests.support.wire_sessions import check_ended_in_order, emulated_laboratory, run
 
 pytestmark = pytest.mark.usefixtures("real_time_alone")
 
