@@ -47,7 +47,7 @@ def main() -> int:
 
 @dataclass(frozen=True)
 class Choice:
-    """The tests that a mutation has to survive: those known to run its lines, otherwise the nearest files."""
+    """The tests that a mutation has to survive: those known to run its lines, otherwise those near its file."""
 
     nearest: Nearest
     covering: Covering | None
@@ -58,7 +58,13 @@ class Choice:
         files = self.nearest.tests(mutation.path)
         lines = range(mutation.line, mutation.line + mutation.before.count("\n"))
         found = [self.covering.tests(mutation.path, line, files) for line in lines] if self.covering else []
-        return next(filter(None, found), files[: self.files])
+        return next(filter(None, found), []) or self._users(mutation.path, files)
+
+    def _users(self, path: str, files: list[str]) -> list[str]:
+        """For lines run at an import or in another process: tests that run others of the file, then the nearest."""
+        users = self.covering.users(path, files) if self.covering else []
+        asked = {test.partition("::")[0] for test in users}
+        return [*users, *(file for file in files[: self.files] if file not in asked)]
 
 
 def tried(mutations: list[Mutation], processes: int, choice: Choice, limit_s: float) -> Iterator[Verdict]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 from coverage import CoverageData
@@ -26,11 +28,24 @@ class Covering:
 
         None are known of lines that run while a module is imported, or in another process.
         """
+        return _in_order(self._contexts(path).get(line, []), files)
+
+    def users(self, path: str, files: list[str]) -> list[str]:
+        """Tests that run any line of a file, in the same order: those that see what it defines at its import."""
+        return _in_order(chain.from_iterable(self._contexts(path).values()), files)
+
+    def _contexts(self, path: str) -> dict[int, list[str]]:
         if path not in self._lines:
             self._lines[path] = self._data.contexts_by_lineno(str(self._root / path))
-        contexts = self._lines[path].get(line, [])
-        order = {file: number for number, file in enumerate(files)}
-        return sorted(
-            {context.rpartition("|")[0] for context in contexts if "|" in context},
-            key=lambda test: (order.get(test.partition("::")[0], len(order)), test),
-        )
+        return self._lines[path]
+
+
+def _in_order(contexts: Iterable[str], files: list[str]) -> list[str]:
+    """Tests by their files, then whole files in which a fixture ran: tests that share it are not told of."""
+    order = {file: number for number, file in enumerate(files)}
+    parts = [context.rpartition("|") for context in contexts if "|" in context]
+    shared = {test.partition("::")[0] for test, _, phase in parts if phase == "setup"}
+    return sorted(
+        {test for test, _, _ in parts} | shared,
+        key=lambda test: ("::" not in test, order.get(test.partition("::")[0], len(order)), test),
+    )

@@ -171,7 +171,22 @@ def test_tests_that_run_a_line_are_asked_before_the_nearest_files(tree: Path, tm
     line = SOURCE.splitlines().index("    if not value > low:") + 1
     assert choice.tests(replace(low, line=line)) == ["tests/unit/test_clamping.py::test_high"]
     imported = replace(low, line=SOURCE.splitlines().index("    value: float = 2.5") + 1)
-    assert choice.tests(imported) == ["tests/unit/test_clamping.py"]
+    clamped, nearest = "tests/unit/test_clamping.py", "tests/unit/test_direct.py"
+    assert choice.tests(imported) == [f"{clamped}::test_counts", f"{clamped}::test_high", f"{clamped}::test_missing"]
+    assert replace(choice, files=2).tests(imported)[3:] == [nearest]
+    unknown = Choice(Nearest(tree), None, files=1)
+    assert unknown.tests(imported) == [clamped]
+
+
+def test_a_fixtures_lines_are_run_for_its_whole_file(tmp_path: Path) -> None:
+    (tmp_path / "drivers.py").write_text("x = 1\n")
+    data = CoverageData(str(tmp_path / "covered"))
+    for context in ("tests/unit/test_b.py::test_it|run", "tests/unit/test_a.py::test_first|setup"):
+        data.set_context(context)
+        data.add_lines({str(tmp_path / "drivers.py"): [1]})
+    data.write()
+    found = Covering(tmp_path, tmp_path / "covered").tests("drivers.py", 1, ["tests/unit/test_b.py"])
+    assert found == ["tests/unit/test_b.py::test_it", "tests/unit/test_a.py::test_first", "tests/unit/test_a.py"]
 
 
 def test_coverage_that_names_no_test_is_refused(tmp_path: Path) -> None:
