@@ -2,8 +2,8 @@
 
 python -m tests.support.published_hands_table FOLDER ... --maps FOLDER --store
 
-The folders are not part of this repository: a user names them, and the folder of motor maps beside them. Only counts
-and reasons are stored.
+The folders are not part of this repository: a user names them, and the folder of motor maps beside them. Only serial
+numbers and outcomes are stored. All hands of a checkout of Shadow's repository are one folder above theirs.
 """
 
 from __future__ import annotations
@@ -22,22 +22,26 @@ from drivers.shadow.model.hand_info import INFO_FILE, HandInfo, stated_serial
 from tests.support.emulated_hands import EmulatedBench
 from tests.support.stored_table import GrowingTable, Outline, parser
 
+_CALIBRATION = "calibration.yaml"
 _COMMAND = "python -m tests.support.published_hands_table FOLDER ... --maps FOLDER --store"
 OUTLINE = Outline(
     "published-hands",
     "Folders of real hands as Shadow publishes them: loaded and moved motor by motor, or refused with the reason.",
     (_COMMAND,),
-    "Every folder with a `general_info.yaml` below those that were named, with the motor map that it names. It is "
-    "checked as by `rig check --move`, on the emulated ring in one process and virtual time. Which folders these were "
-    "is not part of this repository; reasons are given without their numbers.",
-    ("Kind", "Motor map", "Outcome", "Hands"),
+    "Every hand's folder below those that were named, with the motor map that its `general_info.yaml` names. It is "
+    "checked as by `rig check --move`, on the emulated ring in one process and virtual time, with the calibration, "
+    "gains, rates and settings of the boards that it contains. The folders are not part of this repository.",
+    ("Kind", "Motor map", "Outcome", "Hands", "Serial numbers"),
     keys=3,
 )
 
 
 def published_folders(roots: Iterable[Path]) -> list[Path]:
-    """Folders of hands below these, sorted."""
-    return sorted({place.parent for root in roots for place in root.rglob(INFO_FILE)})
+    """Folders of hands below these, by serial number. A template inside a hand's folder is no hand."""
+    known = {place.parent for root in roots for place in root.rglob(INFO_FILE)}
+    known |= {place.parent.parent for root in roots for place in root.rglob(f"calibrations/{_CALIBRATION}")}
+    hands = [folder for folder in known if known.isdisjoint(folder.parents)]
+    return sorted(hands, key=lambda folder: (len(folder.name), folder.name))
 
 
 def map_name(folder: Path) -> str:
@@ -50,15 +54,16 @@ def map_name(folder: Path) -> str:
 
 def published_setup(folder: Path, maps: Path) -> HandSetup:
     """A hand by its published folder. Raises ConfigurationError."""
-    joints = _file(folder, "calibration.yaml")
+    joints = _file(folder, _CALIBRATION)
     if joints is None:
-        raise ConfigurationError("has no calibration.yaml", where=str(folder), hint="Ask Shadow for the hand's folder")
+        raise ConfigurationError(f"has no {_CALIBRATION}", where=str(folder), hint="Ask Shadow for the hand's folder")
     return HandSetup(
         ethercat=EthercatSettings(interface="memory"),
         hand=HandSettings(cycle_s=0.002),
         joints=joints,
         motors=maps / map_name(folder),
         boards=_file(folder, "motor_board_effort_controllers.yaml"),
+        rates=_file(folder, "motor_data_polling.yaml"),
         gains=_file(folder, "sr_edc_joint_position_controllers_PWM.yaml"),
     )
 
@@ -82,8 +87,21 @@ def kind(folder: Path, maps: Path) -> tuple[str, str]:
     return f"{form.side}, {len(form.fingers)} fingers", Path(map_name(folder)).stem
 
 
+def rows(folders: Iterable[Path], maps: Path) -> dict[tuple[str, str, str], list[str]]:
+    """Serial numbers of the hands by kind, motor map and outcome."""
+    groups = defaultdict[tuple[str, str, str], list[str]](list)
+    for folder in folders:
+        words = outcome(folder, maps)
+        print(f"{folder}: {words}", flush=True)
+        groups[*kind(folder, maps), words.replace(f"{folder}/", "").replace(f"{maps}/", "")].append(folder.name)
+    return groups
+
+
 def _file(folder: Path, name: str) -> Path | None:
-    return next(iter(sorted(folder.rglob(name))), None)
+    """The hand's own file of this name, not that of a template inside its folder."""
+    others = [info.parent for info in folder.rglob(INFO_FILE) if info.parent != folder]
+    own = [place for place in folder.rglob(name) if not any(map(place.is_relative_to, others))]
+    return min(own, default=None)
 
 
 def _info(folder: Path) -> HandInfo:
@@ -97,14 +115,10 @@ def main() -> None:
     options.add_argument("folders", nargs="+", type=Path, help="folders of hands, or above them")
     options.add_argument("--maps", type=Path, required=True, help="folder of Shadow's motor maps (rh_E_v3.yaml ...)")
     chosen = options.parse_args()
-    groups = defaultdict[tuple[str, str, str], int](int)
-    for folder in published_folders(chosen.folders):
-        words = outcome(folder, chosen.maps)
-        print(f"{folder}: {words}", flush=True)
-        groups[*kind(folder, chosen.maps), words.replace(f"{folder}/", "").replace(f"{chosen.maps}/", "")] += 1
+    groups = rows(published_folders(chosen.folders), chosen.maps)
     table = GrowingTable(chosen.docs, OUTLINE, sorted(groups))
     for key in sorted(groups):
-        table.put(key, (str(groups[key]),))
+        table.put(key, (str(len(groups[key])), ", ".join(groups[key])))
     table.publish()
 
 

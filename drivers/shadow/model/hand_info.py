@@ -37,15 +37,15 @@ class HandInfo(StrictModel):
 
     Attributes:
         side: of the hand.
-        fingers: that it has, in lower case, the thumb as ``th``; published folders with ``False`` state none, and
-            the motor map tells.
+        fingers: that it has, in lower case, the thumb as ``th``. Old published folders leave them out, others have
+            ``False``: then the motor map tells.
         mapping_path: where its motor map is among Shadow's.
     """
 
     model_config = ConfigDict(extra="ignore")
 
     side: Side
-    fingers: tuple[str, ...] | None = tuple(map(str.lower, FINGERS))
+    fingers: tuple[str, ...] | None = None
     mapping_path: _MapPlace | None = None
 
     @field_validator("fingers", mode="before")

@@ -178,14 +178,26 @@ def _checked_table(joint: str, table: Table, where: str) -> Array:
     points = np.array(sorted(table), dtype=float).reshape(-1, 2)
     if len(points) < 2:
         raise ConfigurationError(f"the table of {joint} needs two or more points", where=where)
+    if not _is_monotonic(points):
+        what = f"the table of {joint} is not monotonic{_outlier(points)}"
+        raise ConfigurationError(what, where=where, hint="Each count needs its own angle")
+    _refuse_placeholders(joint, np.diff(points, axis=0), where)
+    return points
+
+
+def _is_monotonic(points: Array) -> bool:
     steps = np.diff(points, axis=0)
     same_way = (steps[:, 1] > 0).all() or (steps[:, 1] < 0).all() or not steps[:, 1].any()
-    if not same_way or not (steps[:, 0] > 0).all() or not np.isfinite(points).all():
-        raise ConfigurationError(
-            f"the table of {joint} is not monotonic", where=where, hint="Each count needs its own angle"
-        )
-    _refuse_placeholders(joint, steps, where)
-    return points
+    return bool(same_way and (steps[:, 0] > 0).all() and np.isfinite(points).all())
+
+
+def _outlier(points: Array) -> str:
+    """In words, the only point without which a table of four or more points would be monotonic; else nothing."""
+    without = [at for at in range(len(points)) if _is_monotonic(np.delete(points, at, axis=0))]
+    if len(without) != 1 or len(points) < 4:
+        return ""
+    counts, degrees = points[without[0]]
+    return f": {counts:g} counts at {degrees:g} degrees contradict the other points"
 
 
 def _refuse_placeholders(joint: str, steps: Array, where: str) -> None:

@@ -54,6 +54,9 @@ _SHADOW_JOINTS = (
 _MAP_SIDES: dict[str, Side] = {"lh_": "left", "rh_": "right"}
 """Beginnings of the names of Shadow's motor maps."""
 
+_EITHER_SIDE = "lite"
+"""In the name of a map for both sides: Lite hands have none beginning with lh_, and left ones name rh_lite_v1."""
+
 
 class MotorMap:
     """Which motor pulls which joint.
@@ -116,7 +119,10 @@ class MotorMap:
             listed = strict_yaml.validate(content, _ShadowMapFile, where=str(path)).joint_to_motor_mapping
             named = dict(zip(_SHADOW_JOINTS, listed, strict=True))
             numbers = {joint: motor for joint, motor in named.items() if motor >= 0}
-            return cls(numbers, where=str(path), stated_side=_MAP_SIDES.get(path.name[:3]))
+            return cls(numbers, where=str(path), stated_side=_side_by_name(path.name))
+        if isinstance(content, dict) and "joint_to_muscle_mapping" in content:
+            hint = "This program drives hands with motors only"
+            raise ConfigurationError("is the map of a hand with muscles", where=str(path), hint=hint)
         own = strict_yaml.validate(content, _MotorFile, where=str(path))
         return cls(own.motors, own.reversed, str(path), own.side)
 
@@ -130,6 +136,10 @@ class MotorMap:
         for name, motor in self.numbers.items():
             matrix[motor, [JOINT_INDEX[joint] for joint in angles_of_driven(name)]] = 1.0
         return matrix
+
+
+def _side_by_name(name: str) -> Side | None:
+    return None if _EITHER_SIDE in name else _MAP_SIDES.get(name[:3])
 
 
 def drivable_range_rad(motors: MotorMap, calibration: JointCalibration, margin: float) -> Array:

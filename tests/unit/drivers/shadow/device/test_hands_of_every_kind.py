@@ -11,7 +11,6 @@ from drivers.core.errors import ConfigurationError, DeviceError
 from tests.support.emulated_hands import EmulatedBench, setup_of
 from tests.support.hand_family import DEFECTS, family, write_hand
 from tests.support.hand_folders import FOLDERS, FULL_RIGHT, HandFolder, write_folder
-from tests.support.published_hands_table import outcome, published_folders
 
 LITE = next(kind for kind in FOLDERS if kind.name == "rh_lite_v1")
 
@@ -107,25 +106,3 @@ def test_a_defect_of_a_calibration_is_named_with_its_file(tmp_path: Path, defect
     hand = next(hand for hand in family() if hand.defect == defect)
     with pytest.raises(ConfigurationError, match=rf"{hand.serial}/calibrations/calibration\.yaml.*J\d"):
         setup_of(write_hand(tmp_path, hand)).check_files()
-
-
-def test_published_folders_that_are_at_hand_move_or_are_refused_with_the_defect(lab_data: Path) -> None:
-    maps, folders = lab_data / "shadow_motor_maps", published_folders([lab_data / "shadow_hand_config"])
-    told = {folder: outcome(folder, maps) for folder in folders}
-    assert told
-    for folder, words in told.items():
-        if folder.name in UNDETERMINED:
-            assert f"{folder.name}/calibration.yaml: " in words
-            assert "THJ1 and THJ2 does not determine both angles: THJ1 is 20 degrees" in words
-        elif folder.name in DEFECTIVE:
-            assert f"{folder.name}/" in words
-            assert "calibration.yaml" in words
-        else:
-            assert words == "moved", folder
-
-
-DEFECTIVE = {"111", "112", "113", "114", "362", "6282", "6458", "6522", "8458", "5754"}
-"""Serial numbers of the published hands whose calibration is defective itself."""
-
-UNDETERMINED = {"554"}
-"""Those that cannot be emulated: several counts of the thumb mean the same angles."""

@@ -13,6 +13,7 @@ from drivers.shadow.protocol.palm_images import Side
 from tests.support.hand_folders import FOLDERS, FULL_RIGHT, HandFolder, write_folder
 
 RIG = "rig.yaml: hand"
+LITE = next(kind for kind in FOLDERS if kind.name == "rh_lite_v1")
 
 
 def form_of(folder: HandFolder, side: Side | None = None, fingers: tuple[str, ...] | None = None) -> HandForm:
@@ -61,7 +62,7 @@ def test_a_left_hand_is_not_taken_for_a_right_one(tmp_path: Path) -> None:
 
 
 def test_fingers_that_the_motor_map_does_not_drive_are_told(tmp_path: Path) -> None:
-    folder = write_folder(tmp_path, next(kind for kind in FOLDERS if kind.name == "rh_lite_v1"))
+    folder = write_folder(tmp_path, LITE)
     with pytest.raises(ConfigurationError, match=r"rig.yaml: hand: says that the hand's fingers are FF, MF, RF, LF"):
         form_of(folder, fingers=RIGHT_HAND.fingers)
     folder.info.write_text(folder.info.read_text().replace("- rf\n", ""))
@@ -69,11 +70,23 @@ def test_fingers_that_the_motor_map_does_not_drive_are_told(tmp_path: Path) -> N
         form_of(folder)
 
 
-@pytest.mark.parametrize("word", ["False", "false"])
-def test_a_folder_that_states_no_fingers_leaves_them_to_the_motor_map(tmp_path: Path, word: str) -> None:
-    folder = write_folder(tmp_path, FULL_RIGHT)
-    folder.info.write_text(f"side: right\nfingers: {word}\nsensors: {{tip: {{}}}}\n")
-    assert form_of(folder) == RIGHT_HAND
+@pytest.mark.parametrize("line", ["fingers: False", "fingers: false", "name: an_old_folder"])
+@pytest.mark.parametrize("kind", [FULL_RIGHT, LITE], ids=lambda kind: kind.name)
+def test_a_folder_that_states_no_fingers_leaves_them_to_the_motor_map(
+    tmp_path: Path, kind: HandFolder, line: str
+) -> None:
+    folder = write_folder(tmp_path, kind)
+    folder.info.write_text(f"side: right\n{line}\nsensors: {{tip: {{}}}}\n")
+    assert form_of(folder).fingers == kind.fingers
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_maps_of_lite_hands_serve_both_sides(tmp_path: Path, side: Side) -> None:
+    """There is none beginning with lh_: the folder of left hand 4138 names rh_lite_v1."""
+    folder = write_folder(tmp_path, LITE)
+    folder.info.write_text(folder.info.read_text().replace("right", side))
+    check_map(folder.motors, load_infos([folder.joints]))
+    assert form_of(folder) == HandForm(side, form_of(folder).driven)
 
 
 def test_a_folder_with_a_typing_error_is_named(tmp_path: Path) -> None:

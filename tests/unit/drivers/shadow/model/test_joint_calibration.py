@@ -179,6 +179,8 @@ def test_a_coupling_that_leaves_an_angle_open_cannot_be_emulated(tmp_path: Path)
         ([(1000.0, 0.0), (1500.0, 0.0), (2000.0, 5.0)], "not monotonic"),
         ([(1000.0, 5.0), (1500.0, 0.0), (2000.0, 0.0)], "not monotonic"),
         ([(1000.0, 0.0), (2000.0, float("nan"))], "not monotonic"),
+        ([(4095.0, 0.0), (1750.0, 22.5), (2084.0, 45.0), (2371.0, 67.5)], "monotonic: 4095 counts at 0 degrees contra"),
+        ([(1000.0, 0.0), (1100.0, 5.0), (2000.0, 3.0), (2100.0, 10.0)], "not monotonic. Each"),
         ([(4095.0, 0.0), (9.0, 22.5), (7.0, 45.0)], "only 2 counts for 22.5 degrees"),
     ],
 )

@@ -55,6 +55,13 @@ def test_a_map_without_one_of_the_motors_is_refused(tmp_path: Path) -> None:
         MotorMap(MOTORS.numbers, ("FFJ9",))
 
 
+def test_a_map_of_muscles_is_told_as_such(tmp_path: Path) -> None:
+    path = tmp_path / "rh_muscle_v1.yaml"
+    path.write_text("joint_to_muscle_mapping: [[[0, 6], [3, 0]]]\n")
+    with pytest.raises(ConfigurationError, match=r"rh_muscle_v1.yaml: is the map of a hand with muscles"):
+        MotorMap.load(path)
+
+
 def test_gains_go_by_class_with_exceptions_by_name() -> None:
     gains = GainTable(exceptions={"THJ4": JointGains(pwm_per_rad=1.0)})
     assert gains.of("THJ4").pwm_per_rad == 1.0
