@@ -23,6 +23,7 @@ from tests.mutants.nearest import Nearest
 from tests.mutants.trial import Copy, Verdict
 
 ROOT = Path(__file__).resolve().parents[2]
+_AT_LENGTH = 2
 
 
 def main() -> int:
@@ -61,10 +62,15 @@ class Choice:
         return next(filter(None, found), []) or self._users(mutation.path, files)
 
     def _users(self, path: str, files: list[str]) -> list[str]:
-        """For lines run at an import or in another process: tests that run others of the file, then the nearest."""
+        """For lines run at an import or in another process: tests that run others of the file, then the nearest files.
+
+        A process is run by whole sessions and wires: two of those are among the nearest.
+        """
         users = self.covering.users(path, files) if self.covering else []
         asked = {test.partition("::")[0] for test in users}
-        return [*users, *(file for file in files[: self.files] if file not in asked)]
+        at_length = [file for file in files if not file.startswith("tests/unit/")]
+        near = dict.fromkeys([*files[: self.files], *at_length[: _AT_LENGTH if self.covering else 0]])
+        return [*users, *(file for file in near if file not in asked)]
 
 
 def tried(mutations: list[Mutation], processes: int, choice: Choice, limit_s: float) -> Iterator[Verdict]:

@@ -171,9 +171,10 @@ def test_tests_that_run_a_line_are_asked_before_the_nearest_files(tree: Path, tm
     line = SOURCE.splitlines().index("    if not value > low:") + 1
     assert choice.tests(replace(low, line=line)) == ["tests/unit/test_clamping.py::test_high"]
     imported = replace(low, line=SOURCE.splitlines().index("    value: float = 2.5") + 1)
-    clamped, nearest = "tests/unit/test_clamping.py", "tests/unit/test_direct.py"
-    assert choice.tests(imported) == [f"{clamped}::test_counts", f"{clamped}::test_high", f"{clamped}::test_missing"]
-    assert replace(choice, files=2).tests(imported)[3:] == [nearest]
+    clamped, at_length = "tests/unit/test_clamping.py", "tests/system/test_clamping_at_length.py"
+    users = [f"{clamped}::test_counts", f"{clamped}::test_high", f"{clamped}::test_missing"]
+    assert choice.tests(imported) == [*users, at_length]
+    assert replace(choice, files=2).tests(imported) == [*users, "tests/unit/test_direct.py", at_length]
     unknown = Choice(Nearest(tree), None, files=1)
     assert unknown.tests(imported) == [clamped]
 
