@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gtsam import Pose3
+from gtsam import Pose3, Rot3
 
 from drivers.core.contacts import Contact, Grasp
 from drivers.core.errors import TrackingError
-from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet, placement_sigma_m, planar_rotation
+from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 
 
 def contact(point: list[float], normal: list[float], finger: str = "FF") -> Contact:
@@ -60,6 +61,10 @@ def test_the_object_frame_turns_points_and_normals_but_not_heights() -> None:
         (grasp(contact([0, 0, 0], [np.inf, 0, 0])), "NaN or infinite"),
         (grasp(contact([0, 0, 0], [0, 0, 0])), "no length"),
         (grasp(contact([0, 0, 0], [1, 0, 0]), contact([60.0, 0, 0], [-1, 0, 0], "TH")), "millimetres"),
+        (
+            replace(grasp(), hand_motion_world=Pose3(Rot3(), np.array([0, np.nan, 0]))),
+            "hand's motion has NaN or infinite",
+        ),
         (grasp(contact([1e6, 0, 0], [1, 0, 0])), "1e\\+06 m from the world's origin"),
     ],
 )
@@ -73,3 +78,18 @@ def test_no_contact_counts_as_known_exactly() -> None:
     exact = replace(contact([0, 0, 0], [1, 0, 0]), point_covariance_m2=np.zeros((3, 3)))
     seen = ContactSet.of_grasp(grasp(exact), 2, 0.0)
     assert 0 < seen.point_sigma_m[0] <= 1e-6
+
+
+def test_a_rotation_in_the_plane_turns_counter_clockwise() -> None:
+    assert np.allclose(planar_rotation(np.pi / 2) @ [1.0, 0.0], [0.0, 1.0])
+    assert np.allclose(planar_rotation(0.3), Rot3.Rz(0.3).matrix()[:2, :2])
+
+
+def test_an_uncertain_pose_moves_contacts_along_their_normals_only() -> None:
+    """A shift along x moves the contact that faces x, a turn the one whose normal its lever crosses."""
+    seen = ContactSet.of_grasp(grasp(contact([0, 0, 0], [1, 0, 0]), contact([0.1, 0, 0], [0, 1, 0], "MF")), 2, 0.0)
+    row = np.zeros(3)
+    shifted = placement_sigma_m(seen, row, np.diag([4e-6, 0.0, 0.0]), PLANAR)
+    assert shifted == pytest.approx(0.002 / np.sqrt(2))
+    turned = placement_sigma_m(seen, row, np.diag([0.0, 0.0, 1e-4]), PLANAR)
+    assert turned == pytest.approx(0.1 * 0.01 / np.sqrt(2))
