@@ -332,6 +332,23 @@ def test_many_losses_are_a_problem(tip: Nano17) -> None:
     assert "49 of 99 records lost" in tip.health()
 
 
+def test_a_clock_that_was_set_back_and_a_pause_are_problems(calibration: FingertipCalibration) -> None:
+    tip = Nano17("FF", ReplayTransport("ft/FF", []), VirtualClock(), calibration, Nano17Settings())
+    for number, stamp_ms in enumerate((10, 20, 20, 15, 25, 225), start=1):
+        tip.update([WrenchSample(stamp_ms * 1_000_000, np.zeros(6), number, 7 * number)])
+    told = tip.health()
+    assert "stamps went back 1 times: the computer's clock was set" in told
+    assert "silent 1 times for more than 100 ms" in told
+
+
+def test_records_that_the_box_left_out_or_began_anew_are_problems(tip: Nano17) -> None:
+    tip.sequences = SequenceMonitor(step=7)
+    tip.update([WrenchSample(n, np.zeros(6), n, 14 * n) for n in range(1, 51)])
+    assert "the sensor skipped 49 records" in tip.health()
+    tip.update([WrenchSample(51, np.zeros(6), 1, 14 * 51)])
+    assert "the stream restarted 1 times" in tip.health()
+
+
 def test_a_torque_that_never_fits_the_force_makes_the_sensor_faulty(
     tip: Nano17, calibration: FingertipCalibration
 ) -> None:

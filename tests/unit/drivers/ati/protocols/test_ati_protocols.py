@@ -292,3 +292,27 @@ def test_any_bytes_decode_or_raise_our_error(name: str, payload: bytes) -> None:
         FUZZED[name](payload)
     except CodecError as error:
         assert error.where  # noqa: PT017
+
+
+@pytest.mark.parametrize(
+    ("act", "complaint"),
+    [
+        (lambda: can_codec.split_identifier(0x1FA), "identifier 0x1fa is not a message of an F/T board"),
+        (lambda: can_codec.encode_gauges(0, (0, 0, 0, 0, 0, 1 << 15)), "do not fit"),
+        (lambda: controller_codec.encode_binary(Record(0, (1 << 15, 0, 0, 0, 0, 0))), "does not fit 13 bytes"),
+        (lambda: controller_codec.decode_binary(bytes(12)), "12 bytes instead of the 13 of a record"),
+        (lambda: controller_codec.encode_ascii(Record(0, (1, 2, 3))), "3 counts instead of six"),
+        (lambda: gauge_stream.encode_sample((0, 0, 0, 0, 0, 32768)), "does not fit 16 bits"),
+        (lambda: gauge_stream.encode_sample((-32769, 0, 0, 0, 0, 0)), "does not fit 16 bits"),
+        (lambda: gauge_volts.encode_volts(1, (0.0,) * 5), "5 volts instead of six or seven"),
+        (lambda: gauge_volts.decode_volts(bytes(51)), "51 bytes instead of 52 or 60"),
+        (lambda: gauge_volts.decode_volts(gauge_volts.encode_volts(1, (float("nan"),) * 6)), "not finite"),
+    ],
+)
+def test_what_fits_no_message_is_refused_in_words(act: Callable[[], object], complaint: str) -> None:
+    with pytest.raises(CodecError, match=complaint):
+        act()
+
+
+def test_the_largest_and_smallest_gauges_fit_a_sample() -> None:
+    assert len(gauge_stream.encode_sample((32767, -32768, 0, 0, 0, 0))) == gauge_stream.SIZE
