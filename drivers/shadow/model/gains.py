@@ -15,6 +15,9 @@ from drivers.shadow.model.motors import DRIVEN_JOINTS
 from drivers.shadow.protocol.motor_data import MAX_TORQUE
 from drivers.shadow.protocol.palm_images import Side
 
+_MOST_DEADBAND_RAD = 0.1
+"""Published hands state 0.003 and 0.004; with a typing error in it a joint would not be held at all."""
+
 _SIDES: Mapping[str, Side] = {"lh_": "left", "rh_": "right"}
 
 
@@ -92,8 +95,8 @@ class _Pid(StrictModel):
     i: float
     d: float
     i_clamp: float = Field(ge=0.0)
-    max_force: float = Field(ge=0.0)
-    position_deadband: float = Field(ge=0.0)
+    max_force: float = Field(ge=0.0, le=MAX_TORQUE)
+    position_deadband: float = Field(ge=0.0, le=_MOST_DEADBAND_RAD)
     deadband: float = 0.0
     friction_deadband: float = 0.0
 

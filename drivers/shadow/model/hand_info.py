@@ -25,6 +25,9 @@ INFO_FILE = "general_info.yaml"
 _LEVELS = 5
 """Published folders keep the calibration up to four levels below that file."""
 
+_ONE_HAND = "Name the files of the connected hand, and its side"
+"""Which of two sides is wrong, the files cannot tell; a map of the other side would move wrong motors."""
+
 
 class _MapPlace(StrictModel):
     model_config = ConfigDict(extra="ignore")
@@ -107,7 +110,8 @@ def check_map(motors: Path, infos: Mapping[Path, HandInfo]) -> None:
         named = "" if info.mapping_path is None else info.mapping_path.relative_path.name
         if named and motors.name[:3] in ("lh_", "rh_") and motors.name != named:
             what = f"says that the hand's motor map is {named}, but the rig names {motors.name}"
-            raise ConfigurationError(what, where=str(place), hint=f"Set calibration.motors to {named}")
+            hint = f"Set calibration.motors to {named}" if motors.name[:3] == named[:3] else _ONE_HAND
+            raise ConfigurationError(what, where=str(place), hint=hint)
 
 
 def stated_form(motors: Path, infos: Mapping[Path, HandInfo], stated: HandStatement) -> HandForm:
@@ -138,7 +142,7 @@ def _agreed_side(told: Mapping[str, Side]) -> Side:
         place, side = next(iter(told.items()))
         other, its = next((where, said) for where, said in told.items() if said != side)
         what = f"is of a {side} hand, but {other} of a {its} one: contacts would be mirrored"
-        raise ConfigurationError(what, where=place, hint="Name the files of the connected hand, and its side")
+        raise ConfigurationError(what, where=place, hint=_ONE_HAND)
     return next(iter(told.values()), "right")
 
 

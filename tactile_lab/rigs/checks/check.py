@@ -22,7 +22,7 @@ from sessions.recording.recorder import Recorder
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.checks.calibrations import check_borrowed, check_calibrations
-from tactile_lab.rigs.checks.findings import Finding, told_losses
+from tactile_lab.rigs.checks.findings import Finding, told, told_losses
 from tactile_lab.rigs.checks.fingertips import check_fingertips
 from tactile_lab.rigs.checks.hand import ask_once, check_hand, firmware
 from tactile_lab.rigs.checks.stream_watch import StreamWatch, in_words
@@ -169,7 +169,7 @@ def _hand(runtime: RigRuntime, watch: StreamWatch, share: float) -> Finding:
         words.append(f"firmware revision {revisions}")
     words.append(f"{100 * share:.1f} % of cycles lost")
     problems, remarks = told_losses(health, share, losses)
-    return _finding("hand", problems, words + remarks, figures)
+    return told("hand", problems, words + remarks, figures)
 
 
 def _base(runtime: RigRuntime, watch: StreamWatch, share: float) -> Finding:
@@ -178,7 +178,7 @@ def _base(runtime: RigRuntime, watch: StreamWatch, share: float) -> Finding:
     problems, remarks = told_losses(_problems(runtime.base), share)
     identity = runtime.base.identity if isinstance(runtime.base, NamedInstrument) else ""
     words = [identity] if identity else []
-    return _finding("base", problems, [*words, f"at {place} m", in_words(figures), *remarks], figures)
+    return told("base", problems, [*words, f"at {place} m", in_words(figures), *remarks], figures)
 
 
 def _fingertip(finger: str, runtime: RigRuntime, watch: StreamWatch, names: TactileNames, rig: Rig) -> Finding:
@@ -193,7 +193,7 @@ def _fingertip(finger: str, runtime: RigRuntime, watch: StreamWatch, names: Tact
         figures = {**watch.figures(link), "identity": identity, **figures}
         words = [identity, in_words(figures), *words]
     problems = (*tip.health(), *report.problems)
-    return _finding(f"fingertip {finger}", problems, [*words[:1], _tare(problems), *words[1:]], figures)
+    return told(f"fingertip {finger}", problems, [*words[:1], _tare(problems), *words[1:]], figures)
 
 
 def _tare(problems: Sequence[str]) -> str:
@@ -204,13 +204,9 @@ def _camera(runtime: RigRuntime, watch: StreamWatch) -> Finding:
     assert runtime.camera is not None
     height, width = runtime.picture().image.shape[:2]
     figures: Figures = {"width_px": float(width), "height_px": float(height), **watch.figures(CAMERA_LINK)}
-    return _finding("camera", _problems(runtime.camera), [f"{width} x {height} pixels"], figures)
+    return told("camera", _problems(runtime.camera), [f"{width} x {height} pixels"], figures)
 
 
 def _problems(device: object) -> tuple[str, ...]:
     """Problems that a device reports about itself."""
     return device.health() if isinstance(device, WatchedInstrument) else ()
-
-
-def _finding(device: str, problems: tuple[str, ...], words: list[str], figures: Mapping[str, float | str]) -> Finding:
-    return Finding(device, not problems, "; ".join([*problems, *(word for word in words if word)]), figures)

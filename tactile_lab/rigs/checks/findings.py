@@ -20,12 +20,26 @@ class Finding:
         ok: whether it is ready.
         detail: what was found, what is wrong and what to do, with figures, as text.
         figures: the same figures for programs; names carry the unit.
+        first: the first problem alone, where the detail goes on after it.
     """
 
     device: str
     ok: bool
     detail: str
     figures: Mapping[str, float | str] = field(default_factory=dict)
+    first: str = ""
+
+
+def told(
+    device: str, problems: Sequence[str], words: Sequence[str], figures: Mapping[str, float | str], place: str = ""
+) -> Finding:
+    """A device with its problems first, then what else there is to say, all behind the place where it is connected.
+
+    It is ready if there are no problems.
+    """
+    before = f"{place}: " if place else ""
+    detail = before + "; ".join([*problems, *filter(None, words)])
+    return Finding(device, not problems, detail, figures, before + problems[0] if problems else "")
 
 
 def told_losses(health: Sequence[str], share: float, losses: Sequence[str] = ()) -> tuple[tuple[str, ...], list[str]]:

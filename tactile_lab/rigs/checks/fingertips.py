@@ -12,7 +12,7 @@ from drivers.fingertips.kinds import WIRES
 from drivers.fingertips.wiring import place_of
 from drivers.force.force_fingertip import WrenchSample
 from drivers.force.plausibility import noise_objection
-from tactile_lab.rigs.checks.findings import Finding
+from tactile_lab.rigs.checks.findings import Finding, told
 from tactile_lab.rigs.fingertip_rig import FingertipRig
 
 LISTEN_ns = NANOSECONDS
@@ -42,10 +42,9 @@ def _check(rig: FingertipRig, finger: str, tip: Nano17, clock: Clock) -> Finding
     place = place_of(rig.description.wires[finger])
     usable = np.array([sample.wrench for sample in samples if np.isfinite(sample.wrench).all()])
     if len(usable) < 2:
-        return Finding(device, False, f"{place}: {'; '.join(problems) or 'no usable sample'}")
+        return told(device, problems or ["no usable sample"], (), {}, place)
     problems += filter(None, [noise_objection(usable.std(axis=0), tip.calibration)])
-    words = f"{place}: {'; '.join((*problems, _words(tip, samples, usable)))}"
-    return Finding(device, not problems, words, _figures(tip, samples, usable))
+    return told(device, problems, (_words(tip, samples, usable),), _figures(tip, samples, usable), place)
 
 
 def _listen(tip: Nano17, clock: Clock) -> list[WrenchSample]:

@@ -20,7 +20,7 @@ from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_data import SlowData
 from drivers.shadow.protocol.palm_codec import SENSORS
-from tactile_lab.rigs.checks.findings import LOSSY, TOLERATED_LOSS, Finding
+from tactile_lab.rigs.checks.findings import LOSSY, TOLERATED_LOSS, Finding, told
 from tactile_lab.rigs.checks.tactile import TactileLook
 from tactile_lab.rigs.hand_rig import HandRig
 
@@ -99,7 +99,7 @@ def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float)
 
     moved = check_motor_map(hand, motors, cycle, clock)
     wrong = [str(finding) for finding in moved if not finding.ok]
-    return Finding("motor map", not wrong, "; ".join(wrong) or f"each of {len(moved)} motors moves its own joint")
+    return told("motor map", wrong, () if wrong else (f"each of {len(moved)} motors moves its own joint",), {})
 
 
 def _close(hand: ShadowHand) -> None:
@@ -134,7 +134,7 @@ def _cycle(hand: ShadowHand, transport: EthercatTransport | PysoemTransport, sta
     figures = {"start_late_p50_us": punctual.median_us, "start_late_p99_us": punctual.p99_us, "lost_share": share}
     advice: tuple[str, ...] = () if share < TOLERATED_LOSS else (LOSSY,)
     advice += (_PAUSED,) if any(words.endswith(_HALTED) for words in hand.health()) else ()
-    return Finding("cycle", not advice, "; ".join((*advice, words, *remarks)), figures)
+    return told("cycle", advice, (words, *remarks), figures)
 
 
 def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
@@ -142,20 +142,21 @@ def _motors(hand: ShadowHand, sample: HandSample, motors: MotorMap) -> Finding:
     temperature, supply = sample.motor.temperature_C, sample.motor.voltage_V
     heard = np.isfinite(temperature)[motors.is_fitted]
     if not heard.any():
-        return Finding("motors", False, "; ".join((*problems, "no motor has reported its temperature")))
+        return told("motors", (*problems, "no motor has reported its temperature"), (), {})
     hottest = int(np.nanargmax(temperature))
     figures = f"{int(heard.sum())} of {heard.size} answer, warmest {motors.names[hottest]} {temperature[hottest]:.0f} C"
     if np.isfinite(supply).any():
         figures += f", supply {np.nanmin(supply):.1f} V"
     revisions = firmware(sample)
     figures += f", firmware revision {revisions}" if revisions else ""
-    told: dict[str, float | str] = {
+    numbers: dict[str, float | str] = {
         "firmware": revisions,
         "warmest_C": float(temperature[hottest]),
         "answering": float(heard.sum()),
         "spare_us": float(sample.idle_us),
     }
-    return Finding("motors", not problems and bool(heard.all()), "; ".join((*problems, figures)), told)
+    missing = () if problems or heard.all() else ("not every motor answers",)
+    return told("motors", (*problems, *missing), (figures,), numbers)
 
 
 def firmware(sample: HandSample) -> str:
@@ -169,4 +170,4 @@ def _joints(sample: HandSample, form: HandForm) -> Finding:
     counts = zip(SENSORS, sample.status.sensors[:_JOINT_CHANNELS].tolist(), strict=False)
     own = [(name, count) for name, count in counts if str(name)[:4] in form.joints]  # THJ5 and WRJ1 have two each
     dead = [f"{name} reads {count}" for name, count in own if count not in _COUNTS]
-    return Finding("joint sensors", not dead, "; ".join(dead) or f"all {len(own)} within their range")
+    return told("joint sensors", dead, () if dead else (f"all {len(own)} within their range",), {})

@@ -33,7 +33,8 @@ def next_steps(rig: str, findings: Sequence[Finding], *, moved: bool) -> list[st
     again, wrong = f"tactile-lab rig check {rig}", [finding for finding in findings if not finding.ok]
     devices = [finding for finding in wrong if not finding.device.startswith(_CALIBRATION)]
     if devices:
-        return [*(f"{finding.device}: {_first(finding)}" for finding in devices), f"Check again: {again}"]
+        told = (f"{finding.device}: {finding.first or finding.detail}" for finding in devices)
+        return [*told, f"Check again: {again}"]
     has_motors, has_sessions = _kind(rig)
     steps = (
         [f"Clear the space around the hand, then nudge every motor: {again} --move"] if has_motors and not moved else []
@@ -53,11 +54,6 @@ def _kind(rig: str) -> tuple[bool, bool]:
     if path.suffix in {".yaml", ".yml"} and (is_hand_rig(path) or is_fingertip_rig(path)):
         return is_hand_rig(path), False
     return load_rig(rig).description.kind == "wired", True
-
-
-def _first(finding: Finding) -> str:
-    """The first problem of a device; figures and the others follow it."""
-    return finding.detail.split("; ")[0]
 
 
 def _place(finding: Finding) -> tuple[int, str]:

@@ -8,7 +8,7 @@ from drivers.fingertips.kinds import as_palm_kind, palm_kind
 from drivers.shadow.device.hand_samples import HandSample
 from drivers.shadow.device.tactile_requests import TactileKind, TactileProtocol
 from drivers.shadow.protocol.tactile_names import TactileNames
-from tactile_lab.rigs.checks.findings import Finding
+from tactile_lab.rigs.checks.findings import Finding, told
 
 _UNREAD = "not read: set hand.tactile to biotac in the rig file"
 
@@ -47,5 +47,4 @@ class TactileLook:
             return Finding(device, True, f"{words}; {_UNREAD if readable else 'not read: there is no driver for it'}")
         report = self._kind.report(tip, self._names, "")
         problems = [*report.problems, *(text for text in tip.health() if text != "not tared")]
-        told = filter(None, [*problems, *report.words])
-        return Finding(device, not problems, "; ".join(told), report.figures)
+        return told(device, problems, report.words, report.figures)

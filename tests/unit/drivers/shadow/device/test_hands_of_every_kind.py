@@ -61,6 +61,11 @@ def test_the_folder_of_another_serial_number_is_refused_before_anything_moves(tm
         ("joints", ("- 2487", "- 24870"), r"calibration.yaml: the table of \w+ has 24870 counts; its sensor reads 0"),
         ("joints", ("- 90\n", "- 900\n"), r"calibration.yaml: the table of \w+ has 900 degrees; no joint turns"),
         ("gains", ("max_force: 500.0", "max_force: 5000.0"), r"PWM.yaml: max_force of FFJ0 is 5000, but the largest"),
+        (
+            "gains",
+            ("position_deadband: 0.003", "position_deadband: 3"),
+            r"PWM.yaml, .*: pid.position_deadband: .* not 3",
+        ),
         ("info", ("- ff\n", "- fff\n"), r"general_info.yaml: names a finger that there is not: FFF. Fingers are FF"),
         (
             "motors",

@@ -43,10 +43,16 @@ def test_the_file_lies_above_the_calibration_in_published_folders(tmp_path: Path
     assert load_infos([tmp_path.parent / "calibration.yaml"]) == {}
 
 
-@pytest.mark.parametrize("motors", ["rh_E_v4.yaml", "lh_E_v5.yaml"])
-def test_a_motor_map_of_another_hand_is_refused_with_the_right_one(tmp_path: Path, motors: str) -> None:
+@pytest.mark.parametrize(
+    ("motors", "remedy"),
+    [
+        ("rh_E_v4.yaml", "Set calibration.motors to rh_E_v3.yaml"),
+        ("lh_E_v5.yaml", "Name the files of the connected hand, and its side"),
+    ],
+)
+def test_a_motor_map_of_another_hand_is_refused(tmp_path: Path, motors: str, remedy: str) -> None:
     infos = load_infos([write_folder(tmp_path, FULL_RIGHT).joints])
-    words = rf"general_info.yaml: says that the hand's motor map is rh_E_v3.yaml, but the rig names {motors}"
+    words = rf"general_info.yaml: says that the hand's motor map is rh_E_v3.yaml, but the rig names {motors}. {remedy}"
     with pytest.raises(ConfigurationError, match=words):
         check_map(Path(motors), infos)
     check_map(Path("motors.yaml"), infos)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tactile_lab.rigs.checks.findings import Finding
+from tactile_lab.rigs.checks.findings import Finding, told
 from tactile_lab.rigs.checks.next_steps import next_steps
 
 SOUND = Finding("hand", True, "hand 634, in operation")
-SILENT = Finding("fingertip MF", False, "MF: no answer from 192.168.1.12. Check the box's power; 0 messages/s")
+SILENT = told("fingertip MF", ["no answer from 192.168.1.12. Check the box's power"], ["0 messages/s"], {})
+REFUSED = Finding("hand", False, "its data are of another size; those of palm 0240 are 74. Ask for its layout")
 FOREARM = Finding("calibration forearm", False, "was never measured. Calibrate it: tactile-lab calibrate forearm")
 LENS = Finding("calibration camera", False, "was never measured. Calibrate it: tactile-lab calibrate camera")
 JOINTS = Finding("calibration joints", False, "did not pass its limits. Calibrate again: tactile-lab calibrate joints")
@@ -16,9 +17,14 @@ JOINTS = Finding("calibration joints", False, "did not pass its limits. Calibrat
 
 def test_a_device_that_does_not_work_comes_before_everything() -> None:
     assert next_steps("sim-wire", [FOREARM, SOUND, SILENT], moved=False) == [
-        "fingertip MF: MF: no answer from 192.168.1.12. Check the box's power",
+        "fingertip MF: no answer from 192.168.1.12. Check the box's power",
         "Check again: tactile-lab rig check sim-wire",
     ]
+
+
+def test_what_a_device_refuses_is_told_with_its_remedy() -> None:
+    first, _ = next_steps("sim-wire", [REFUSED], moved=False)
+    assert first == f"hand: {REFUSED.detail}"
 
 
 def test_motors_come_before_calibrations_and_those_in_the_order_in_which_they_need_each_other() -> None:
