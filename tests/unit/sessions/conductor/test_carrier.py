@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gtsam import Pose3
+from gtsam import Pose3, Rot3
 
 from sessions.conductor.carrier import Carrier
 from sessions.conductor.estimator import Reorientation
@@ -17,17 +17,18 @@ from sessions.recording.recorder import Level
 TURN, STAY = Reorientation(0.4, np.zeros(2)), Reorientation(0.0, np.zeros(2))
 HELD = frozenset({"FF", "MF", "TH"})
 FIRM = Forecast(force_N=1.2, slip_m=0.001, slip_rad=0.01, leans=False)
+FELT = Pose3(Rot3(), np.array([0.01, 0.0, 0.0]))
 SLIPPERY = Forecast(force_N=1.5, slip_m=0.012, slip_rad=0.2, leans=True)
 
 
 class Bench:
     """A carrier with roles that only note what is asked of them."""
 
-    def __init__(self, forecast=FIRM, touching=HELD, may_weigh=True):
+    def __init__(self, forecast=FIRM, touching=HELD, may_weigh=True, carry=None, jammed=()):
         self.done, self.told, self.logged, self.motions = [], [], [], []
         cycle = SimpleNamespace(
             plan=None,
-            jammed=(),
+            jammed=jammed,
             squeeze=lambda touching: self.done.append("squeeze"),
             reorient=lambda turn, shift, touching: self.done.append("re-orient") or Pose3(),
         )
@@ -41,7 +42,7 @@ class Bench:
         )
         properties = SimpleNamespace(in_words=lambda: "mass 300 g")
         runtime = SimpleNamespace(
-            perception=SimpleNamespace(carry=None, properties=properties),
+            perception=SimpleNamespace(carry=carry, properties=properties, hand_motion_world=FELT),
             log=lambda level, source, text: self.logged.append(text),
         )
         self.grasp = SimpleNamespace(touching=touching, contacts=())
@@ -86,3 +87,23 @@ def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
     refused = Bench(may_weigh=False).carry(weighed=True)
     assert "weigh" not in refused.done
     assert refused.told == [(Level.INFO, "the object is not weighed")]
+
+
+@pytest.mark.parametrize(("remarkable", "told"), [(True, [(Level.WARNING, "the object slipped by 9 mm")]), (False, [])])
+def test_how_the_object_moved_is_what_the_fingertips_felt(remarkable, told):
+    carry = SimpleNamespace(is_remarkable=remarkable, in_words=lambda: "slipped by 9 mm")
+    bench = Bench(carry=carry).carry()
+    assert bench.told == told
+    assert ("the object slipped by 9 mm" in bench.logged) is not remarkable
+    assert bench.motions == [FELT]
+
+
+def test_a_re_orientation_that_fingers_stopped_is_told():
+    (told,) = Bench(jammed=("FF", "TH")).carry().told
+    assert told == (Level.WARNING, "FF, TH pressed hard: re-orientation stopped early")
+
+
+def test_a_weighing_says_how_it_ended_and_what_it_found():
+    ((level, words),) = Bench().carry(weighed=True).told
+    assert level is Level.INFO
+    assert words == f"weighed: {LiftEnd.HUNG}; mass 300 g"

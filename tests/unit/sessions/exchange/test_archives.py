@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
+import re
 import stat
 import zipfile
 
@@ -103,6 +105,25 @@ def test_links_are_refused(session, tmp_path):
         import_archive(path, tmp_path / "in")
 
 
+def test_what_is_encrypted_is_refused_by_name(session, tmp_path):
+    path = repacked(session, tmp_path / "bad.zip", {})
+    content = bytearray(path.read_bytes())
+    for entry in re.finditer(rb"PK\x01\x02", bytes(content)):
+        content[entry.start() + 8] |= 1
+    path.write_bytes(content)
+    with pytest.raises(ConfigurationError, match="is encrypted"):
+        import_archive(path, tmp_path / "in")
+    assert not (tmp_path / "in").exists()
+
+
+def test_no_more_bytes_come_out_than_an_archive_may_have(tmp_path):
+    with pytest.raises(ConfigurationError, match="unpacks to more bytes than it declares"):
+        archives._copy(io.BytesIO(bytes(11)), io.BytesIO(), 10, tmp_path / "s.zip")
+    out = io.BytesIO()
+    assert archives._copy(io.BytesIO(b"0123456789"), out, 10, tmp_path / "s.zip") == 10
+    assert out.getvalue() == b"0123456789"
+
+
 def test_sizes_are_bounded(session, tmp_path):
     bomb = repacked(session, tmp_path / "bomb.zip", {"s/zeros": bytes(20_000_000)})
     with pytest.raises(ConfigurationError, match="which is implausible"):
@@ -130,6 +151,22 @@ def test_an_archive_that_is_no_whole_session_is_refused_and_nothing_is_left(sess
     with pytest.raises(ConfigurationError, match=words):
         import_archive(path, tmp_path / "in")
     assert not (tmp_path / "in").exists() or not list((tmp_path / "in").iterdir())
+
+
+def test_a_session_without_its_recording_is_none(session, tmp_path):
+    files = {name: content for name, content in files_of(session).items() if not name.endswith("traffic.mcap")}
+    with pytest.raises(ConfigurationError, match=r"contains no session \(a folder with session\.yaml and traffic"):
+        import_archive(archive_of(tmp_path / "bad.zip", files), tmp_path / "in")
+
+
+def test_half_an_archive_on_a_full_disk_is_taken_away(session, tmp_path, monkeypatch):
+    def fill(*arguments):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(zipfile.ZipFile, "write", fill)
+    with pytest.raises(WriteError, match=r"cannot be written .*Check the disk"):
+        export_archive(session, tmp_path / "s.zip")
+    assert not (tmp_path / "s.zip").exists()
 
 
 def test_many_small_files_are_weighed_together(tmp_path):

@@ -99,6 +99,11 @@ def test_an_imported_log_is_read_back_as_it_was(tmp_path):
         ("time_s,x_m,y_m,nx,ny,held\n0,0,0,1,0,1\n", "the tool's pose is missing"),
         ("time_s,x_m,y_m,nx,ny,tool_x_m\n0,0,0,1,0,1\n", "incomplete pose"),
         ("time_s,x_m,y_m,nx,ny,tool_x_m,tool_y_m,tool_yaw_rad\n0,0,0,1,0,0,0,90\n", "radians, not degrees"),
+        (
+            "time_s,x_m,y_m,nx,ny,tool_x_m,tool_y_m,tool_qx,tool_qy,tool_qz,tool_qw\n0,0,0,1,0,0,0,0,0,0,1.02\n",
+            "a quaternion must have length 1, not 1.02",
+        ),
+        ('time_s,x_m,y_m,nx,ny\n0,"0,0,1,0\n' + 14_000 * "0,0,0,1,0\n", "a quotation does not end"),
         ("time_s,x_m,y_m,x_m,nx,ny\n0,0,0,0,1,0\n", "two columns have the same name"),
         ("time_s,x_m,y_m,nx,ny\n", "contains no contact"),
         ("time_s;x_m;y_m;nx;ny\n0;0,05;0;1;0\n", "Separate the columns by commas"),

@@ -9,7 +9,7 @@ import numpy as np
 from gtsam import Pose2, Pose3, Rot3
 
 from drivers.shadow.closing.posture import HandShape
-from sessions.conductor.decisions import DoGrasp, End, Pause
+from sessions.conductor.decisions import DoGrasp, End, Pause, UndoGrasp
 from sessions.conductor.estimator_client import LocalClient
 from sessions.conductor.policy_decisions import PolicyDecisions, Proposal, approve_everything
 from sessions.guided.attended import AttendedDecisions
@@ -174,6 +174,15 @@ def test_attended_session_records_and_approves_the_policys_decisions_too() -> No
     assert told == []
     assert isinstance(who.decide(1), DoGrasp)
     assert [(choice.number, len(choice.vetoed)) for choice in told] == [(2, 1)]
+
+
+def test_attended_session_is_ended_or_set_back_at_its_page() -> None:
+    who = AttendedDecisions(estimator(planner()), lambda choice: None, approve_everything, Presser(Ask.UNDO, Ask.END))
+    undone, ended = who.decide(3), who.decide(2)
+    assert isinstance(undone, UndoGrasp)
+    assert undone.reason == "by the operator on the page"
+    assert isinstance(ended, End)
+    assert ended.reason == "ended by the operator on the page after 2 grasps"
 
 
 def test_attended_session_ends_when_its_policy_stops() -> None:
