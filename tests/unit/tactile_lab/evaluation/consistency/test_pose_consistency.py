@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
 
 from drivers.core.contacts import Array
 from drivers.core.rotations import exponential, logarithm
+from tactile_lab.evaluation.consistency.figures import PoseFigures, common_covariances
 from tactile_lab.evaluation.consistency.levels import LEVELS
 from tactile_lab.evaluation.consistency.pose_covariance import covariance_in_world, pose_deviation
 from tactile_lab.evaluation.consistency.poses import birth_frame, common_frame, pose_consistency
@@ -65,6 +68,38 @@ def test_the_given_birth_pose_and_unknown_ones_do_not_count() -> None:
     found = pose_consistency(told[:3], stated, truth[:3], birth_frame(told[:3], truth[:3]))
     assert found is not None
     assert len(found.nees) == 1
+
+
+def test_errors_count_in_standard_deviations_of_the_components_that_were_estimated() -> None:
+    """On a table one is off by two sigma in x, in space one by a sigma in all six; another covariance is void."""
+    variances = np.array([1e-6, 4e-6, 9e-6, 1e-4, 4e-4, 9e-4])
+    on_table = covariance_in_world(Pose3(), np.diag(variances[[0, 1, 5]]))
+    void = np.diag(variances)
+    void[0, 1] = void[1, 0] = 3e-6
+    errors = [np.zeros(6), np.array([0.002, 0, 0, 0, 0, 0]), np.sqrt(variances), np.zeros(6)]
+    told = [moved(Pose3(), error) for error in errors]
+    found = pose_consistency(told, [1e-12 * np.eye(6), on_table, np.diag(variances), void], [Pose3()] * 4, Pose3())
+    assert found is not None
+    assert found.nees == pytest.approx((4 / 3, 1.0), rel=1e-3)
+    assert found.components == 6
+    assert found.inside == (0.0, 0.5, 1.0)  # chi square: 4 is beyond 3.5 of three components, 6 within 7.0 of six
+    table, space = (
+        -0.5 * (squared + np.sum(np.log(2 * np.pi * of)))
+        for squared, of in ((4.0, variances[[0, 1, 5]]), (6.0, variances))
+    )
+    assert found.log_score == pytest.approx((table + space) / 2, rel=1e-4)
+    assert PoseFigures.of(found) == PoseFigures(2, pytest.approx(7 / 6, rel=1e-3), found.inside, found.log_score)
+    assert PoseFigures.of(None) is None
+
+
+def test_covariances_of_the_common_frame_are_those_stated_of_known_poses() -> None:
+    stated = [STATED.tolist(), None, STATED.tolist()]
+    trajectory = SimpleNamespace(world_T_object=(Pose3(), Pose3(), None))
+    results = SimpleNamespace(slam={"common_covariances": stated}, trajectory=trajectory)
+    first, *others = common_covariances(results)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(first, covariance_in_world(Pose3(), STATED))
+    assert others == [None, None]
+    assert common_covariances(SimpleNamespace(slam={}, trajectory=trajectory)) == ()  # type: ignore[arg-type]
 
 
 def test_without_the_birth_grasps_truth_only_the_common_frame_is_known() -> None:
