@@ -125,6 +125,30 @@ def _calibration(kind: HandFolder) -> dict[str, object]:
     }
 
 
+_REPLACED_TIPS = [[f"{finger}J1", [[0.0, 20.0], [1.0, 20.0]]] for finger in FINGERS if finger != "TH"]
+_FIXED_THUMB = [[[1.0, 2050.0], 20.0, -40.0], [[0.0, 2200.0], 20.0, 0.0], [[0.0, 2400.0], 20.0, 40.0]]
+
+
+def fix_joints(folder: HandFolder) -> tuple[str, ...]:
+    """Change a full hand's folder as that of published hand 554.
+
+    Fingertips replace the last joints: J1 has 20 degrees at every count, and no sensor. The gains of THJ1 and of LFJ0,
+    which has an unsound tendon, have a largest demand of zero. Returns these.
+    """
+    tables = yaml.safe_load(folder.joints.read_text())
+    turning = [row for row in tables["sr_calibrations"] if row[0][2:] != "J1" or row[0] == "WRJ1"]
+    content = {
+        "sr_calibrations": turning + _REPLACED_TIPS,
+        "sr_calibrations_coupled": [[["THJ1", "THJ2"], _FIXED_THUMB]],
+    }
+    folder.joints.write_text(yaml.safe_dump(content))
+    gains = yaml.safe_load(folder.gains.read_text())
+    for joint in (not_driven := ("LFJ0", "THJ1")):
+        gains[f"sh_rh_{joint.lower()}_position_controller"]["pid"] |= {"p": 0.0, "max_force": 0.0}
+    folder.gains.write_text(yaml.safe_dump(gains))
+    return not_driven
+
+
 _PID = {"i": 0.0, "d": 0.0, "i_clamp": 0.0, "max_force": 500.0, "position_deadband": 0.003}
 
 

@@ -72,10 +72,13 @@ def outcome(folder: Path, maps: Path) -> str:
     """``moved``, or why not."""
     try:
         setup = published_setup(folder, maps)
-        findings = EmulatedBench(setup, stated_serial(setup.infos()) or 634).moves()
+        bench = EmulatedBench(setup, stated_serial(setup.infos()) or 634)
+        findings = bench.moves()
     except TactileLabError as error:
         return str(error)
-    return "; ".join(str(finding) for finding in findings if not finding.ok) or "moved"
+    left_out = [joint for joint in bench.motors.driven if joint not in bench.hand.drivable]
+    moved = f"moved; not to be driven: {', '.join(left_out)}" if left_out else "moved"
+    return "; ".join(str(finding) for finding in findings if not finding.ok) or moved
 
 
 def kind(folder: Path, maps: Path) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from tactile_lab.rigs.checks.check import check_rig
 from tactile_lab.rigs.emulate import emulated_hand
 from tactile_lab.rigs.hand_rig import load_hand_rig
 from tests.support.ethercat_wire import JOINTS, cable
-from tests.support.hand_folders import FOLDERS, write_folder
+from tests.support.hand_folders import FOLDERS, FULL_RIGHT, fix_joints, write_folder
 
 pytestmark = pytest.mark.usefixtures("real_time_alone")
 
@@ -76,6 +76,20 @@ def test_a_lite_hand_is_emulated_by_its_own_folder_and_moves_motor_by_motor(tmp_
     assert "10 of 10 answer" in findings["motors"].detail
     assert findings["joint sensors"].detail == "all 13 within their range"
     assert findings["motor map"].detail == "each of 10 motors moves its own joint"
+
+
+def test_fixed_joints_and_motors_that_are_not_to_be_driven_are_left_alone_and_told(tmp_path: Path) -> None:
+    folder = write_folder(tmp_path / "554", FULL_RIGHT)
+    fix_joints(folder)
+    files = {"joints": str(folder.joints), "motors": str(folder.motors), "gains": str(folder.gains)}
+    with cable("r") as (near, far):
+        file = rig_file(tmp_path, near, far_end=far, calibration=files)
+        with emulated_hand(load_hand_rig(file)):
+            findings = {finding.device: finding for finding in check_rig(str(file), move=True)}
+    assert findings["joint sensors"].detail == "all 21 within their range"
+    assert findings["motors"].ok
+    words = "each of 18 motors moves its own joint; not to be driven: LFJ0, THJ1"
+    assert (findings["motor map"].ok, findings["motor map"].detail) == (True, words)
 
 
 def test_a_simulated_rig_has_no_motors_to_nudge() -> None:

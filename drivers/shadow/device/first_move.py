@@ -86,7 +86,7 @@ def check_motor_map(
         motors: the map to check; the hand's own.
         cycle: one cycle of the hand: exchange, and wait for the next.
         clock: the hand's.
-        joints: driven joints to check; all that the hand has unless given.
+        joints: driven joints to check; all that may be driven unless given.
         settings: how far.
 
     Returns:
@@ -97,7 +97,7 @@ def check_motor_map(
     """
     findings = []
     check = _MotorCheck(hand, motors, cycle, clock, settings or FirstMoveSettings())
-    for finding in map(check.find, motors.driven if joints is None else joints):
+    for finding in map(check.find, hand.drivable if joints is None else joints):
         findings.append(finding)
         if finding.moved is not None and not finding.ok:
             break

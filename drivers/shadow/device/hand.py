@@ -174,9 +174,14 @@ class ShadowHand:
                 0 ends it and nothing moves.
 
         Raises:
-            DeviceError: not a driven joint, or too large.
+            DeviceError: not a driven joint, one that is not to be driven, or too large.
         """
         self._motion.nudge(joint, pwm)
+
+    @property
+    def drivable(self) -> tuple[str, ...]:
+        """Driven joints whose largest demand is not zero."""
+        return self._motion.drivable
 
     @property
     def targets_rad(self) -> dict[str, float]:

@@ -58,6 +58,11 @@ class HandMotion:
         return self._control.driven if self._nudge is None else self._nudge != 0
 
     @property
+    def drivable(self) -> tuple[str, ...]:
+        """Driven joints whose largest demand is not zero."""
+        return self._control.drivable
+
+    @property
     def targets_rad(self) -> dict[str, float]:
         """The targets that are set, by driven joint, radians."""
         return self._control.targets_rad
@@ -76,11 +81,14 @@ class HandMotion:
         """Drive one motor alone with a small duty cycle, in place of everything else; 0 ends it and nothing moves.
 
         Raises:
-            DeviceError: not a driven joint, or too large.
+            DeviceError: not a driven joint, one that is not to be driven, or too large.
         """
         if joint not in self._motors.numbers or not abs(pwm) <= LARGEST_NUDGE:
             what = f"cannot nudge {joint} with {pwm} counts"
             raise DeviceError(what, where=self._where, hint=f"Use at most {LARGEST_NUDGE}, and a driven joint")
+        if joint not in self.drivable:
+            what = f"{joint} is not to be driven: its largest demand is 0"
+            raise DeviceError(what, where=self._where, hint="Find out why its gains say so before you change them")
         self._control.clear()
         motor = self._motors.numbers[joint]
         self._nudge = np.zeros(MOTORS, dtype=np.int16) if pwm else None

@@ -121,7 +121,7 @@ class HandProcess:
         Raises:
             DeviceError: the hand stopped itself, or its process is gone.
         """
-        self._child.give({"first_move": list(self._setup.motor_map().driven if joints is None else joints)})
+        self._child.give({"first_move": None if joints is None else list(joints)})
         answer = self._await(RecordKind.MOVES, _MOVES_s)
         if "error" in answer:
             raise DeviceError(answer["error"])

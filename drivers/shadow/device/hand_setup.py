@@ -18,7 +18,8 @@ from drivers.shadow.model.gains import GainTable, load_gains
 from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.hand_info import HandInfo, HandStatement, check_map, load_infos, stated_form, stated_serial
 from drivers.shadow.model.joint_calibration import JointCalibration
-from drivers.shadow.model.motors import MotorMap
+from drivers.shadow.model.kinematics import JOINT_INDEX
+from drivers.shadow.model.motors import MotorMap, angles_of_driven
 from drivers.shadow.protocol.motor_configuration import load_configurations
 from drivers.shadow.protocol.motor_data import MAX_PWM
 from drivers.shadow.protocol.palm_images import PalmName
@@ -104,11 +105,21 @@ class HandSetup(StrictModel):
         """Read every file that is named, and compare them with the files next to them. Raises ConfigurationError."""
         check_map(self.motors, self.infos())
         self.wiring()
-        self.settings()
+        self._refuse_blind_joints()
         self.motor_map()
-        self.calibration()
         if self.boards is not None:
             load_configurations(self.boards, self.form().driven)
+
+    def _refuse_blind_joints(self) -> None:
+        gains, turns = self.settings().gains, self.calibration().turns
+        for name in self.form().driven:
+            seen = any(turns[JOINT_INDEX[joint]] for joint in angles_of_driven(name))
+            if not seen and gains.of(name).max_pwm > 0.0:
+                what = (
+                    f"has the same angle of {name} at every count, but its gains drive it: it would be pushed blindly"
+                )
+                hint = f"Calibrate {name}; if it is fixed, name the hand's own gains, whose max_force of it is 0"
+                raise ConfigurationError(what, where=str(self.joints), hint=hint)
 
     def infos(self) -> dict[Path, HandInfo]:
         """What the hand's own folders say of it, by file. Raises ConfigurationError."""

@@ -138,7 +138,7 @@ class HandWorker:
         }
         self._answer(RecordKind.REPORT, report)
 
-    def _check_motor_map(self, joints: list[str]) -> None:
+    def _check_motor_map(self, joints: list[str] | None) -> None:
         self._moving_by_itself = True
         try:
             findings = check_motor_map(self._hand, self._motors, self._sound_turn, self._clock, joints)

@@ -64,14 +64,13 @@ class JointWatch:
         self._motors, self._limits, self._where = motors, limits, where
         self._calibrated = calibration.range_counts
         span = limits.margin * np.diff(self._calibrated, axis=1)[:, 0]
-        here = calibration.has_joint
+        here = calibration.turns  # nothing rests on what a fixed joint reads
         self._low = np.where(here, np.maximum(self._calibrated[:, 0] - span, _RAIL), -np.inf)
         self._high = np.where(here, np.minimum(self._calibrated[:, 1] + span, FULL_SCALE - _RAIL), np.inf)
         self._sensor = np.flatnonzero(SENSOR_HAS_JOINT)[here[JOINT_OF_SENSOR]]
         self._joint_of_sensor = JOINT_OF_SENSOR[here[JOINT_OF_SENSOR]]
-        self._pushing_from = limits.frozen_share * largest
-        pairs = [angles_of_driven(name) if name else JOINTS[:1] for name in motors.names]  # no motor, no demand
-        self._joints_of_motor = np.array([[JOINT_INDEX[pair[0]], JOINT_INDEX[pair[-1]]] for pair in pairs])
+        self._pushing_from = np.maximum(limits.frozen_share * largest, 1.0)
+        self._joints_of_motor = np.array([_first_and_last(name, calibration) for name in motors.names])
         self.restart()
 
     def restart(self) -> None:
@@ -155,3 +154,10 @@ class JointWatch:
     def _fault(self, motor: int, joint: int, words: tuple[str, str]) -> Fault:
         what, hint = words
         return Fault(f"stopped: {what}", f"{self._where}, {JOINTS[joint]} (motor {motor})", hint)
+
+
+def _first_and_last(driven: str, calibration: JointCalibration) -> tuple[int, int]:
+    """The joints of a motor that can be seen turning; any for a place without a motor, which has no demand."""
+    joints = [JOINT_INDEX[name] for name in (angles_of_driven(driven) if driven else JOINTS[:1])]
+    seen = [joint for joint in joints if calibration.turns[joint]] or joints
+    return seen[0], seen[-1]

@@ -58,7 +58,7 @@ class LoadWatch:
     def __init__(self, motors: MotorMap, limits: LoadLimits, largest_pwm: NDArray[np.float64], where: str) -> None:
         self._motors, self._limits, self._where = motors, limits, where
         self._largest_pwm: list[float] = np.minimum(largest_pwm, MAX_PWM).tolist()
-        self._stalling = [math.floor(largest) for largest in self._largest_pwm]
+        self._stalling = [max(math.floor(largest), 1) for largest in self._largest_pwm]  # without demand none stalls
         self._torque = [limits.exceptions.get(name, limits.torque_counts) for name in motors.names]
         self._stall_ns = limits.stall_s * NANOSECONDS
         self.restart()

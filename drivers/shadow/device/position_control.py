@@ -35,7 +35,9 @@ class PositionControl:
 
     Attributes:
         active: whether any target or demand is set.
-        driven: motors with a target or a demand of their own, shape (20,).
+        driven: motors with a target or a demand of their own that may be driven, shape (20,).
+        drivable: the driven joints whose largest demand is not zero. Shadow's files have zero where a tendon is
+            unsound, or the joint fixed.
     """
 
     def __init__(self, motors: MotorMap, gains: GainTable, range_rad: Array | None = None) -> None:
@@ -46,6 +48,7 @@ class PositionControl:
         self._deadband_rad = np.array([each.deadband_rad for each in table])
         self._minus_deadband_rad = -self._deadband_rad
         self._limit = np.array([each.max_pwm for each in table])
+        self.drivable: tuple[str, ...] = tuple(name for name in motors.driven if gains.of(name).max_pwm > 0.0)
         self._damping = np.array([each.damping for each in table])
         self._integral_gain = np.array([each.integral for each in table])
         self._integral_max = np.array([each.integral_max for each in table])
@@ -90,7 +93,7 @@ class PositionControl:
         """What every cycle needs of the choice between targets, demands and nothing."""
         self._idle = ~(self._is_set | self._is_direct)
         self._any_direct = bool(self._is_direct.any())
-        self.driven = ~self._idle
+        self.driven = ~self._idle & (self._limit > 0.0)
         self.active = not self._idle.all()
 
     @property

@@ -66,10 +66,14 @@ class Plane:
             raise ValueError("folds over itself: some points may be swapped")
         self._forward = _TriangleMap(nodes, values, triangles, fitted)
         upright = np.abs(_doubled_areas(values, triangles)) > _FLAT
-        self.invertible = bool(upright.any())
-        """Whether the target determines the source."""
-        if self.invertible:
+        constant = ~np.ptp(target, axis=0).astype(bool)
+        self.invertible = bool(upright.any()) or bool(constant.sum() == 1)
+        """Whether the target determines the source; where one coordinate is constant, on the line of the table."""
+        self._inverse: _TriangleMap | _LineMap
+        if upright.any():
             self._inverse = _TriangleMap(values, nodes, triangles[upright], _invert(fitted))
+        elif self.invertible:
+            self._inverse = _LineMap(source, target, int(constant.argmin()))
 
     def __call__(self, point: Array) -> Array:
         """The image of one point, shapes (2,)."""
@@ -109,6 +113,17 @@ class _TriangleMap:
         if smallest[triangle] < _INSIDE:
             return np.asarray(point @ self._beyond[:2] + self._beyond[2])
         return np.asarray(weights[:, triangle] @ self._targets[triangle])
+
+
+class _LineMap:
+    """The source by one coordinate of the target, the other of which is constant."""
+
+    def __init__(self, source: Array, target: Array, varying: int) -> None:
+        order = target[:, varying].argsort()
+        self._varying, self._knots, self._source = varying, target[order, varying], source[order]
+
+    def __call__(self, point: Array) -> Array:
+        return np.array([np.interp(point[self._varying], self._knots, along) for along in self._source.T])
 
 
 def _lines(x: Array, y: Array) -> list[tuple[float, float, float]]:

@@ -57,6 +57,8 @@ class JointCalibration:
 
     Attributes:
         has_joint: which of the 24 joints the hand has, shape (24,).
+        turns: which of them have more than one angle, shape (24,). A joint that was fixed, as under some fingertips,
+            has the same at every count; its sensor may be gone.
         range_counts: smallest and largest calibrated count of each joint, shape (24, 2), order of
             :data:`~drivers.shadow.model.kinematics.JOINTS`; of a joint with two sensors their average.
         range_rad: the same for the angles, radians. Zero for a joint that the hand does not have.
@@ -92,6 +94,7 @@ class JointCalibration:
         in_order = np.array([ends.get(joint, ((0.0, 0.0), (0.0, 0.0))) for joint in JOINTS])
         self.range_counts: Array = in_order[:, 0]
         self.range_rad: Array = np.radians(in_order[:, 1])
+        self.turns: NDArray[np.bool_] = self.range_rad[:, 0] < self.range_rad[:, 1]
 
     @classmethod
     def load(cls, path: Path, joints: Collection[str] = JOINTS) -> JointCalibration:
@@ -148,15 +151,9 @@ class JointCalibration:
         return sensors
 
     def _undetermined(self, pair: NDArray[np.intp]) -> ConfigurationError:
-        names, degrees = [JOINTS[joint] for joint in pair], np.degrees(self.range_rad[pair])
-        fixed = [
-            f"{name} is {low:g} degrees in every row"
-            for name, (low, high) in zip(names, degrees, strict=True)
-            if low == high
-        ]
-        why = f": {', '.join(fixed)}" if fixed else ""
+        first, second = (JOINTS[joint] for joint in pair)
         return ConfigurationError(
-            f"sr_calibrations_coupled: the table of {' and '.join(names)} does not determine both angles{why}",
+            f"sr_calibrations_coupled: the table of {first} and {second} does not determine both angles",
             where=self._where,
             hint="A real hand can use it as it is; an emulated one needs another calibration, in which both turn",
         )

@@ -16,7 +16,8 @@ from drivers.shadow.device.motor_polling import PollingRates
 from drivers.shadow.device.real_time import PRIORITY, prefer
 from drivers.shadow.ethercat.hand_transport import EthercatTransport
 from drivers.shadow.ethercat.pysoem_transport import PysoemTransport
-from drivers.shadow.model.hand_form import HandForm
+from drivers.shadow.model.joint_calibration import JointCalibration
+from drivers.shadow.model.kinematics import JOINTS
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.motor_data import SlowData
 from drivers.shadow.protocol.palm_codec import SENSORS
@@ -74,7 +75,7 @@ def _hear(
         _ring(transport),
         _cycle(hand, transport, statistics),
         _motors(hand, sample, motors),
-        _joints(sample, form),
+        _joints(sample, setup.calibration()),
     ]
     found += tips.findings()
     return [*found, _motor_map(hand, motors, clock, setup.hand.cycle_s)] if move else found
@@ -99,7 +100,10 @@ def _motor_map(hand: ShadowHand, motors: MotorMap, clock: Clock, cycle_s: float)
 
     moved = check_motor_map(hand, motors, cycle, clock)
     wrong = [str(finding) for finding in moved if not finding.ok]
-    return told("motor map", wrong, () if wrong else (f"each of {len(moved)} motors moves its own joint",), {})
+    words: tuple[str, ...] = () if wrong else (f"each of {len(moved)} motors moves its own joint",)
+    left_out = [joint for joint in motors.driven if joint not in hand.drivable]
+    words += (f"not to be driven: {', '.join(left_out)}",) if left_out else ()
+    return told("motor map", wrong, words, {})
 
 
 def _close(hand: ShadowHand) -> None:
@@ -165,9 +169,10 @@ def firmware(sample: HandSample) -> str:
     return ", ".join(f"{revision:.0f}" for revision in np.unique(revisions[np.isfinite(revisions)]))
 
 
-def _joints(sample: HandSample, form: HandForm) -> Finding:
-    """A joint sensor at the end of its range has lost its magnet or its cable."""
+def _joints(sample: HandSample, calibration: JointCalibration) -> Finding:
+    """A joint sensor at the end of its range has lost its magnet or its cable; a fixed joint needs none."""
     counts = zip(SENSORS, sample.status.sensors[:_JOINT_CHANNELS].tolist(), strict=False)
-    own = [(name, count) for name, count in counts if str(name)[:4] in form.joints]  # THJ5 and WRJ1 have two each
+    turning = {joint for joint, turns in zip(JOINTS, calibration.turns, strict=True) if turns}
+    own = [(name, count) for name, count in counts if str(name)[:4] in turning]  # THJ5 and WRJ1 have two each
     dead = [f"{name} reads {count}" for name, count in own if count not in _COUNTS]
     return told("joint sensors", dead, () if dead else (f"all {len(own)} within their range",), {})

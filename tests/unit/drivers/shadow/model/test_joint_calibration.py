@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.shadow.model.interpolation import Curves, Plane
 from drivers.shadow.model.joint_calibration import JointCalibration
-from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad
+from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, JOINT_LIMITS_rad, joint_vector
 from drivers.shadow.protocol.palm_codec import SENSORS
 from tactile_lab import rigs
 
@@ -156,16 +155,25 @@ def test_a_fixed_joint_has_one_angle_and_reads_the_middle_of_its_table() -> None
     assert calibration.raw_counts(np.zeros(24))[0] == 0.5
 
 
-def test_a_coupling_that_leaves_an_angle_open_cannot_be_emulated(tmp_path: Path) -> None:
-    """As in a published hand without a sensor in the thumb's last joint: file, joint, value and remedy are named."""
-    rows = [[[1.0, 2061.0], 20.0, -40.0], [[0.0, 2128.0], 20.0, -15.0], [[0.0, 2405.0], 20.0, 40.0]]
-    path = tmp_path / "calibration.yaml"
-    plain = [[joint, table] for joint, table in tables().items() if joint not in ("THJ1", "THJ2")]
-    path.write_text(yaml.safe_dump({"sr_calibrations": plain, "sr_calibrations_coupled": [[["THJ1", "THJ2"], rows]]}))
-    calibration = JointCalibration.load(path)
-    words = (
-        f"^{re.escape(str(path))}: .*THJ1 and THJ2 does not determine both angles: THJ1 is 20 degrees.*needs another"
-    )
+def coupled(*rows: tuple[tuple[float, float], float, float]) -> JointCalibration:
+    """A calibration with these points of THJ1 and THJ2."""
+    plain = {joint: table for joint, table in tables().items() if joint not in ("THJ1", "THJ2")}
+    return JointCalibration(plain, {("THJ1", "THJ2"): rows}, "hand.yaml")
+
+
+def test_a_thumb_whose_last_joint_is_fixed_is_read_and_emulated() -> None:
+    """As in a published hand without a sensor in that joint."""
+    calibration = coupled(((1.0, 2061.0), 20.0, -40.0), ((0.0, 2128.0), 20.0, -15.0), ((0.0, 2405.0), 20.0, 40.0))
+    assert [calibration.turns[JOINT_INDEX[joint]] for joint in ("THJ1", "THJ2")] == [False, True]
+    for degrees in (-40.0, -15.0, 3.0, 40.0):
+        sensors = calibration.raw_counts(joint_vector({"THJ1": 0.7, "THJ2": np.radians(degrees)}))
+        assert angle_deg(calibration, "THJ2", sensors) == pytest.approx(degrees)
+        assert angle_deg(calibration, "THJ1", sensors) == pytest.approx(20.0)
+
+
+def test_a_coupling_that_leaves_an_angle_open_cannot_be_emulated() -> None:
+    calibration = coupled(((1.0, 2061.0), 20.0, -40.0), ((0.0, 2128.0), 30.0, -20.0), ((0.0, 2405.0), 40.0, 0.0))
+    words = r"^hand.yaml: .*THJ1 and THJ2 does not determine both angles\. .*needs another"
     with pytest.raises(ConfigurationError, match=words):
         calibration.raw_counts(np.zeros(24))
 
