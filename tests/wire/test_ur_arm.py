@@ -174,6 +174,12 @@ def test_where_the_arm_stands_is_read_with_the_tool_that_was_set(
     assert "4.6 kg" in served.device.identity
 
 
+def test_a_long_tool_of_the_pendant_does_not_put_the_arm_outside_its_workspace(served: Served) -> None:
+    served.box._flange_T_tcp = pose_of((0.0, 0.0, 2.0, 0.0, 0.0, 0.0))
+    served.device.connect()
+    np.testing.assert_allclose(served.device.exchange().q, HERE, atol=1e-6)
+
+
 def test_an_arm_whose_software_is_not_known_is_refused_before_it_is_taken_over(served: Served) -> None:
     served.box.version = (10, 7, 0, 1)
     with pytest.raises(DeviceError, match=r"PolyScope 10\.7\.0\.1 is not known to this program\. CB3 arms need"):

@@ -199,7 +199,7 @@ class ControlBox:
         if self.runtime_state == _PLAYING:
             self._stand()
             self.stopped_ns = self._clock.now_ns()
-        self.runtime_state, self.free = runtime_state, False
+        self.runtime_state, self.free, self._watchdog_ns = runtime_state, False, None
 
     # --- the program -------------------------------------------------------------------------------------------
 

@@ -87,8 +87,11 @@ def not_ready(arm: ArmState, settings: UrSettings) -> Refusal | None:
     return None
 
 
-def before_program(arm: ArmState, q: Array, settings: UrSettings) -> Refusal | None:
-    """Why a session may not take the arm over; None if it may. ``q`` is where it stands, shape (6,)."""
+def before_program(arm: ArmState, settings: UrSettings) -> Refusal | None:
+    """Why a session may not take the arm over; None if it may.
+
+    Where it stands is for :func:`before_motion`: until then it is told with the tool of the pendant.
+    """
     if settings.payload_kg is None:
         return Refusal("no payload is stated", "Weigh hand and adapter: base: {payload_kg: ...} in the rig file")
     if settings.flange_T_forearm is None:
@@ -97,7 +100,7 @@ def before_program(arm: ArmState, q: Array, settings: UrSettings) -> Refusal | N
         return refusal
     if arm.runtime_state == PLAYING:
         return Refusal("a program is running on the arm", "Stop it on the pendant, or end the program that sent it")
-    return outside(q, settings)
+    return None
 
 
 def before_motion(arm: ArmState, q: Array, settings: UrSettings) -> Refusal | None:

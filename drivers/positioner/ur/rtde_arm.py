@@ -77,7 +77,7 @@ class RtdeArm:
             self._knock(port, purpose)
         found = self._identity()
         self._listen()
-        self._refuse(before_program(self.state(), self.q(), self._settings))
+        self._refuse(before_program(self.state(), self._settings))
         self._control = self._called("rtde_control", "RTDEControlInterface", self._rate_hz)
         self._prepare()
         return f"{found}, payload {self._settings.payload_kg} kg"

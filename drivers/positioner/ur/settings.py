@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from drivers.core.configuration import StrictModel
 from drivers.positioner.settings import PositionerSettings, Range
 
 Vector = tuple[float, float, float]
+_FARTHEST_m = 1.0
 
 
 class UrSettings(PositionerSettings):
@@ -59,6 +61,16 @@ class UrSettings(PositionerSettings):
     gain: float = Field(default=400.0, ge=100.0, le=2000.0)
     patience_s: float = Field(default=0.5, gt=0.0, le=5.0)
     unheard_s: float = Field(default=0.2, gt=0.0, le=5.0)
+
+    @field_validator("centre_of_gravity_m", "flange_T_forearm")
+    @classmethod
+    def _metres_and_radians(cls, stated: tuple[float, ...] | None) -> tuple[float, ...] | None:
+        """Millimetres and degrees are the usual mistake; an arm would take them."""
+        if stated is not None and math.hypot(*stated[:3]) > _FARTHEST_m:
+            raise ValueError(f"must be metres, within {_FARTHEST_m:g} of the flange")
+        if stated is not None and math.hypot(*stated[3:]) > 2.0 * math.pi:
+            raise ValueError("must turn by radians, one turn at most")
+        return stated
 
     @model_validator(mode="after")
     def _reach_is_not_empty(self) -> UrSettings:

@@ -83,6 +83,7 @@ def _devices(rig: Rig, seed: int, move: bool) -> list[Finding]:
             try:
                 runtime.connect()
                 runtime.run(SETTLE_ns)
+                watch.begin()
                 before = _cycles_and_losses(runtime)
                 runtime.run(LISTEN_ns)
                 shares = _shares_lost(before, _cycles_and_losses(runtime))

@@ -33,8 +33,7 @@ def next_steps(rig: str, findings: Sequence[Finding], *, moved: bool) -> list[st
     again, wrong = f"tactile-lab rig check {rig}", [finding for finding in findings if not finding.ok]
     devices = [finding for finding in wrong if not finding.device.startswith(_CALIBRATION)]
     if devices:
-        told = (f"{finding.device}: {finding.first or finding.detail}" for finding in devices)
-        return [*told, f"Check again: {again}"]
+        return [*map(_repair, devices), f"Check again: {again}"]
     has_motors, has_sessions = _kind(rig)
     steps = (
         [f"Clear the space around the hand, then nudge every motor: {again} --move"] if has_motors and not moved else []
@@ -54,6 +53,11 @@ def _kind(rig: str) -> tuple[bool, bool]:
     if path.suffix in {".yaml", ".yml"} and (is_hand_rig(path) or is_fingertip_rig(path)):
         return is_hand_rig(path), False
     return load_rig(rig).description.kind == "wired", True
+
+
+def _repair(finding: Finding) -> str:
+    told = finding.first or finding.detail
+    return told if told.startswith(f"{finding.device}: ") else f"{finding.device}: {told}"
 
 
 def _place(finding: Finding) -> tuple[int, str]:

@@ -20,6 +20,10 @@ class StreamWatch:
         """Note one message's stamp."""
         self._stamps_ns[topic].append(stamp_ns)
 
+    def begin(self) -> None:
+        """Forget what came while the other devices were connected, which holds up those connected before them."""
+        self._stamps_ns.clear()
+
     def figures(self, transport: str) -> dict[str, float | str]:
         """Rate, jitter and longest gap of a transport's messages; empty for fewer than three messages.
 

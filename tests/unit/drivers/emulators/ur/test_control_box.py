@@ -118,6 +118,14 @@ def test_the_watchdog_ends_a_program_that_nobody_feeds(bench: Bench) -> None:
     assert bench.forearm.pose is before
 
 
+def test_a_program_that_a_person_starts_is_not_watched_by_the_last_one(bench: Bench) -> None:
+    bench.command(35, 10.0)
+    bench.box.befall("stop program")
+    bench.box.befall("start program")
+    bench.wait(1.0)
+    assert bench.box.output("runtime_state") == 2
+
+
 @pytest.mark.parametrize(
     ("event", "value", "output", "told"),
     [

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivers.core.configuration import validate
+from drivers.core.errors import ConfigurationError
 from drivers.positioner.ur.checks import before_motion, before_program, outside, stop_cause, wrong_version
 from drivers.positioner.ur.codec import ArmFlags, ArmState
 from drivers.positioner.ur.settings import UrSettings
@@ -16,7 +18,7 @@ SETTINGS = UrSettings(payload_kg=4.6, flange_T_forearm=(0.0, 0.0, 0.06, 0.0, 0.0
 
 
 def test_a_ready_arm_is_taken_over() -> None:
-    assert before_program(IDLE, HERE, SETTINGS) is None
+    assert before_program(IDLE, SETTINGS) is None
     assert before_motion(READY, HERE, SETTINGS) is None
     assert stop_cause(READY, SETTINGS) is None
 
@@ -37,7 +39,7 @@ def test_a_ready_arm_is_taken_over() -> None:
 def test_an_arm_that_is_not_ready_is_refused_with_value_and_remedy(
     arm: ArmState, settings: UrSettings, words: str
 ) -> None:
-    refusal = before_program(arm, HERE, settings)
+    refusal = before_program(arm, settings)
     assert refusal is not None
     assert words in refusal.what
     assert refusal.remedy
@@ -69,6 +71,12 @@ def test_other_versions_are_refused_by_their_number(version: str) -> None:
     assert refusal.what == f"PolyScope {version} is not known to this program"
 
 
+def test_an_arm_outside_its_workspace_may_not_move() -> None:
+    refusal = before_motion(READY, np.array([0.5, 0.0, 1.4, 0, 0, 0]), SETTINGS)
+    assert refusal is not None
+    assert "z is 1.400" in refusal.what
+
+
 def test_a_load_felt_at_rest_means_a_wrong_payload() -> None:
     refusal = before_motion(replace(READY, force_N=(0.0, 0.0, -45.0)), HERE, SETTINGS)
     assert refusal is not None
@@ -94,6 +102,19 @@ def test_what_ends_a_session_is_named(arm: ArmState, words: str) -> None:
 
 def test_a_person_who_leads_the_arm_may_push_it() -> None:
     assert stop_cause(replace(READY, force_N=(90.0, 0, 0), flags=READY.flags | ArmFlags.FREE), SETTINGS) is None
+
+
+@pytest.mark.parametrize(
+    ("stated", "words"),
+    [
+        ({"centre_of_gravity_m": [0, 0, 120]}, "centre_of_gravity_m: must be metres, within 1 of the flange"),
+        ({"flange_T_forearm": [0, 0, 60, 0, 0, 1.57]}, "flange_T_forearm: must be metres"),
+        ({"flange_T_forearm": [0, 0, 0.06, 0, 0, 90]}, "flange_T_forearm: must turn by radians"),
+    ],
+)
+def test_millimetres_and_degrees_are_refused(stated: dict[str, object], words: str) -> None:
+    with pytest.raises(ConfigurationError, match=words):
+        validate(stated, UrSettings, where="rig.yaml")
 
 
 def test_an_empty_reach_is_refused() -> None:

@@ -25,6 +25,8 @@ def test_a_device_that_does_not_work_comes_before_everything() -> None:
 def test_what_a_device_refuses_is_told_with_its_remedy() -> None:
     first, _ = next_steps("sim-wire", [REFUSED], moved=False)
     assert first == f"hand: {REFUSED.detail}"
+    first, _ = next_steps("sim-wire", [Finding("base", False, "base: protective stop. Release it")], moved=False)
+    assert first == "base: protective stop. Release it"
 
 
 def test_motors_come_before_calibrations_and_those_in_the_order_in_which_they_need_each_other() -> None:
