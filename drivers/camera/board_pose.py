@@ -48,13 +48,11 @@ def board_pose(
     """
     if len(points_m) < 4 or _in_one_line(points_m):
         return None
-    good, rotations, translations, _ = cv2.solvePnPGeneric(
-        points_m, pixels, camera.matrix, camera.distortion_coefficients, flags=cv2.SOLVEPNP_IPPE
-    )
-    if not good:
+    # IPPE divides by zero where a picture is exactly symmetric, as simulated ones can be.
+    starts = _starts(points_m, pixels, camera, cv2.SOLVEPNP_IPPE)
+    starts = starts or _starts(points_m, pixels, camera, cv2.SOLVEPNP_ITERATIVE)
+    if not starts:
         return None
-    starts = [_pose(r, t) for r, t in zip(rotations, translations, strict=True)]
-    starts = [start for start in starts if np.isfinite(start.matrix()).all()]
     best = min((_refine(s, points_m, pixels, camera) for s in starts), key=lambda found: found.reprojection_px)
     floor = max(best.reprojection_px, np.sqrt(2.0) * corner_sigma_px)
     distinct = tuple(_assess(start, points_m, pixels, camera) for start in starts if _differs(start, best))
@@ -74,6 +72,15 @@ def pose_covariance(camera_T_points: Pose3, points_m: Array, camera: CameraCalib
     turns = -by_point @ cross_matrices(points_m)
     rows = np.concatenate([turns, by_point], axis=2).reshape(-1, 6) / sigma_px
     return np.asarray(np.linalg.pinv(rows.T @ rows))
+
+
+def _starts(points_m: Array, pixels: Array, camera: CameraCalibration, method: int) -> list[Pose3]:
+    """The finite ones of a method's poses."""
+    good, rotations, translations, _ = cv2.solvePnPGeneric(
+        points_m, pixels, camera.matrix, camera.distortion_coefficients, flags=method
+    )
+    found = [_pose(r, t) for r, t in zip(rotations, translations, strict=True)] if good else []
+    return [start for start in found if np.isfinite(start.matrix()).all()]
 
 
 def _refine(start: Pose3, points_m: Array, pixels: Array, camera: CameraCalibration) -> MarkerPose:

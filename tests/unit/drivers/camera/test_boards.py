@@ -10,7 +10,7 @@ from gtsam import Pose3, Rot3
 
 from drivers.camera.board_pose import board_pose, pose_covariance
 from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker, load_board
-from drivers.camera.calibration import load_camera
+from drivers.camera.calibration import CameraCalibration, load_camera
 from drivers.camera.frames import decode_image
 from drivers.camera.rendering.board_camera import board_poses, draw_board, simulated_lens
 from drivers.core.contacts import Array
@@ -34,6 +34,15 @@ def test_a_drawn_board_is_found_whole_where_it_is(board: AnyBoard) -> None:
         error = truth.between(found.camera_T_board)
         assert np.linalg.norm(error.translation()) < 0.004 * np.linalg.norm(truth.translation())
         assert rotation_angle_rad(error) < np.radians(3.0 if board.kind == "single" else 0.6)
+
+
+def test_a_board_tilted_exactly_about_an_axis_of_the_picture_has_its_pose() -> None:
+    truth = Pose3(Rot3.Ry(-0.3), np.array([0.0, 0.0, 0.6]))
+    corners = np.array([[x, y, 0.0] for y in np.linspace(-0.1, 0.1, 5) for x in np.linspace(-0.1, 0.1, 5)])
+    lens = CameraCalibration(focal_px=(704.0, 704.0), centre_px=(320.0, 240.0), size_px=(640, 480))
+    found = board_pose(corners, lens.project(transform_points(truth, corners)), lens)
+    assert found is not None
+    assert found.camera_T_board.equals(truth, 1e-5)
 
 
 @pytest.mark.parametrize("board", BOARDS, ids=lambda board: board.kind)
