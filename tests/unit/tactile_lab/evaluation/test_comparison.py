@@ -99,3 +99,68 @@ def test_an_interval_excludes_zero_on_either_side_by_more_than_the_margin() -> N
     assert [one.excludes_zero(1.0) for one in (above, below, around)] == [True, True, False]
     assert [one.excludes_zero(2.5) for one in (above, below, around)] == [False, False, False]
     assert not Interval(3.0, None, None).excludes_zero()
+
+
+FULL: dict[str, Any] = {
+    "object": "box",
+    "method": "joint",
+    "dimension": 3,
+    "seed": 7,
+    "grasps": 12,
+    "status": "partial",
+    "failed": None,
+    "shape_best_fit": {"hausdorff_mm": 3.25, "mean_distance_mm": 0.5},
+    "pose": {"rmse_mm": 1.5, "rmse_deg": 2.5},
+    "pose_umeyama": {"rmse_mm": 1.25},
+    "consistency": {"poses": {"inside": [0.25, 0.5, 0.75]}, "surface": {"inside": [0.1, 0.2, 0.9]}},
+    "registration_rms_mm": 0.75,
+    "sensing": {"median_mm": 0.3},
+}
+VALUES = [3.25, 0.5, 1.5, 2.5, 1.25, 0.75, 0.9, 0.75, 0.3]
+
+
+def test_every_figure_is_found_in_an_evaluation() -> None:
+    (only,) = compare([EvaluatedRun("a", "results", FULL)])
+    assert [figure.mean.mean for figure in only.figures if figure.mean] == VALUES
+    assert [figure.count for figure in only.figures] == [1] * 9
+    (line,) = csv.DictReader(io.StringIO(rows_csv([EvaluatedRun("a", "results", FULL)])))
+    head = {"session": "a", "results": "results", "object": "box", "method": "joint, 3-D", "seed": "7"}
+    assert line | head | {"grasps": "12", "status": "partial", "failed": ""} == line
+    assert [float(value) for value in list(line.values())[8:]] == VALUES
+
+
+@pytest.mark.parametrize("inside", [[], [0.25, 0.5], None, {"2": 0.5}])
+def test_a_place_that_a_list_does_not_have_is_unknown(inside: Any) -> None:
+    run = EvaluatedRun("a", "results", FULL | {"consistency": {"poses": {"inside": inside}}})
+    assert run.figure(("consistency", "poses", "inside", 2)) is None
+    assert run.figure(("consistency", "poses", "inside", 2, "deeper")) is None
+
+
+def test_a_table_has_a_line_for_each_method_and_figure() -> None:
+    runs = [
+        judged("a", "joint", 1.0),
+        judged("b", "joint", 2.0),
+        judged("a", "icp", 1.5, True),
+        judged("b", "icp", 2.5),
+    ]
+    head, first, _, second, _ = table(compare(runs))
+    assert head == [
+        *("method", "figure", "n", "median / p90 / max", "mean [95 %]", "relative to the first [95 %]", "failed")
+    ]
+    assert first == [
+        *("joint, 2-D", "position RMSE, mm", "2", "1.50 / 1.90 / 2.00", "1.50 [-4.85, 7.85]", "\u2013", "0 of 2")
+    ]
+    spread, mean = "2.00 / 2.40 / 2.50", "2.00 [-4.35, 8.35]"
+    assert second == ["icp, 2-D", "position RMSE, mm", "2", spread, mean, "0.50 [0.50, 0.50]", "1 of 2"]
+    assert short_table(compare(runs))[1] == [first[0], first[1], first[2], first[4], first[5]]
+    assert markdown(compare(runs)).splitlines()[1:3] == [
+        "| --- | --- | ---: | ---: | ---: | ---: | ---: |",
+        f"| {' | '.join(first)} |",
+    ]
+
+
+def test_sessions_that_the_first_method_has_not_are_not_compared() -> None:
+    runs = [judged("a", "joint", 1.0), judged("b", "joint", None), judged("a", "icp", 4.0), judged("b", "icp", 9.0)]
+    _, icp = compare([*runs, judged("c", "icp", 9.0)])
+    assert icp.figures[2].count == 3
+    assert icp.figures[2].against_first == Interval(3.0, None, None)
