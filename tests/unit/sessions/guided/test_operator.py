@@ -65,6 +65,19 @@ def test_prompts_lead_through_every_grasp(tmp_path: Path) -> None:
     one = [Stage.PLACE, Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE]
     assert order[:8] == [*one, Stage.ROTATE, Stage.RELEASE, Stage.PLACE]
     assert all(panel.prompt for panel in run.operator.panels if panel.stage is not Stage.ESTIMATE)
+    prompts = list(dict.fromkeys(panel.prompt for panel in run.operator.panels if panel.grasp == 1))
+    guided = [prompt for prompt in prompts if prompt][1:]  # the first is about placing the object
+    assert [prompt.split(".")[0] for prompt in guided[:9]] == [
+        "Move the hand around the object",
+        "Close the fingers",
+        "Bringing the fingers to the contact force",
+        "Hold still",
+        "Capturing: hold still",
+        "Considering how to turn the object",
+        "Building up the squeeze",
+        "Turn the object",
+        "Releasing the object",
+    ]
 
 
 def test_guided_grasps_are_those_of_the_same_conductor(tmp_path: Path) -> None:
