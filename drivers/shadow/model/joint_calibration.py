@@ -176,7 +176,7 @@ def _checked_table(joint: str, table: Table, where: str) -> Array:
     if len(points) < 2:
         raise ConfigurationError(f"the table of {joint} needs two or more points", where=where)
     if not _is_monotonic(points):
-        what = f"the table of {joint} is not monotonic{_outlier(points)}"
+        what = f"the table of {joint} is not monotonic{_contradiction(points)}"
         raise ConfigurationError(what, where=where, hint="Each count needs its own angle")
     _refuse_placeholders(joint, np.diff(points, axis=0), where)
     return points
@@ -188,8 +188,11 @@ def _is_monotonic(points: Array) -> bool:
     return bool(same_way and (steps[:, 0] > 0).all() and np.isfinite(points).all())
 
 
-def _outlier(points: Array) -> str:
-    """In words, the only point without which a table of four or more points would be monotonic; else nothing."""
+def _contradiction(points: Array) -> str:
+    """In words, a count with several angles, or the only point of four or more that does not fit; else nothing."""
+    counts, times = np.unique(points[:, 0], return_counts=True)
+    if times.max() > 1:
+        return f": {counts[times.argmax()]:g} counts stand for {times.max()} angles"
     without = [at for at in range(len(points)) if _is_monotonic(np.delete(points, at, axis=0))]
     if len(without) != 1 or len(points) < 4:
         return ""

@@ -182,7 +182,8 @@ def test_a_coupling_that_leaves_an_angle_open_cannot_be_emulated() -> None:
     ("table", "problem"),
     [
         ([(1000.0, 0.0)], "two or more points"),
-        ([(1000.0, 0.0), (1000.0, 10.0)], "not monotonic"),
+        ([(1000.0, 0.0), (1000.0, 10.0)], "not monotonic: 1000 counts stand for 2 angles"),
+        ([(3267.0, 0.0), (8.0, 22.5), (3267.0, 45.0), (3267.0, 90.0)], "not monotonic: 3267 counts stand for 3 angles"),
         ([(1000.0, 0.0), (1500.0, 10.0), (2000.0, 5.0)], "not monotonic"),
         ([(1000.0, 0.0), (1500.0, 0.0), (2000.0, 5.0)], "not monotonic"),
         ([(1000.0, 5.0), (1500.0, 0.0), (2000.0, 0.0)], "not monotonic"),
