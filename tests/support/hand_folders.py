@@ -34,6 +34,7 @@ _MAPS = {
 """Motors in the order of ``DRIVEN_JOINTS``."""
 
 _LITE = {"FFJ0": 5, "FFJ3": 6, "FFJ4": 15, "RFJ0": 1, "RFJ3": 0, "RFJ4": 10, "THJ1": 14, "THJ2": 13}
+_LITE_V1 = {**_LITE, "MFJ0": 2, "MFJ3": 3, "MFJ4": 4, "THJ4": 12, "THJ5": 11}
 _OLD_LITE = {"FFJ0": 16, "FFJ3": 5, "FFJ4": 7, "RFJ0": 1, "RFJ3": 2, "RFJ4": 10, "THJ1": 14, "THJ2": 13}
 _NO_LITTLE = {joint: motor for joint, motor in zip(DRIVEN_JOINTS, _MAPS["rh_E_v3"], strict=True) if joint[:2] != "LF"}
 
@@ -47,6 +48,7 @@ class HandFolder:
         numbers: motor of each driven joint that it has.
         palm: its palm.
         backwards: joints whose gains are negative.
+        mirrored: a left hand with a map that serves both sides, as those of Lite hands do.
         root: the folder.
     """
 
@@ -54,12 +56,13 @@ class HandFolder:
     numbers: dict[str, int]
     palm: PalmName = "0220"
     backwards: tuple[str, ...] = ()
+    mirrored: bool = False
     root: Path = Path()
 
     @property
     def side(self) -> Side:
-        """By the name of the map."""
-        return "left" if self.name.startswith("lh") else "right"
+        """By the name of the map, unless that serves both."""
+        return "left" if self.mirrored or self.name.startswith("lh") else "right"
 
     @property
     def fingers(self) -> tuple[str, ...]:
@@ -91,7 +94,8 @@ FOLDERS: tuple[HandFolder, ...] = (
     *(HandFolder(name, dict(zip(DRIVEN_JOINTS, numbers, strict=True))) for name, numbers in _MAPS.items()),
     HandFolder("rh_E_v3_no_lf", _NO_LITTLE),
     HandFolder("rh_lite", {**_OLD_LITE, "MFJ0": 0, "MFJ3": 3, "MFJ4": 4, "THJ4": 18, "THJ5": 19}),
-    HandFolder("rh_lite_v1", {**_LITE, "MFJ0": 2, "MFJ3": 3, "MFJ4": 4, "THJ4": 12, "THJ5": 11}),
+    HandFolder("rh_lite_v1", _LITE_V1),
+    HandFolder("rh_lite_v1", _LITE_V1, mirrored=True),
     HandFolder("rh_extra_lite_v1", {**_LITE, "THJ4": 3, "THJ5": 2}),
     HandFolder("rh_E_v3_no_mf_rf_lf", {joint: motor for joint, motor in _NO_LITTLE.items() if joint[:2] not in "MFRF"}),
 )
@@ -153,7 +157,7 @@ _PID = {"i": 0.0, "d": 0.0, "i_clamp": 0.0, "max_force": 500.0, "position_deadba
 
 
 def _gains(kind: HandFolder) -> dict[str, object]:
-    prefix = kind.name[:2]
+    prefix = "lh" if kind.side == "left" else "rh"
     named = {joint: -1.0 if joint in kind.backwards else 1.0 for joint in kind.numbers}
     return {
         f"sh_{prefix}_{joint.lower()}_position_controller": {

@@ -12,7 +12,7 @@ from tests.support.emulated_hands import EmulatedBench
 from tests.support.hand_folders import FOLDERS, FULL_RIGHT, HandFolder, write_folder
 from tests.support.published_hands_table import outcome, published_folders, published_setup, rows
 
-LITE = next(kind for kind in FOLDERS if kind.name == "rh_lite_v1")
+LITE, LEFT_LITE = (kind for kind in FOLDERS if kind.name == "rh_lite_v1")
 
 
 def publish(root: Path, name: str, kind: HandFolder) -> HandFolder:
@@ -26,9 +26,7 @@ def publish(root: Path, name: str, kind: HandFolder) -> HandFolder:
 
 def test_every_hand_is_in_the_table_by_its_serial_number(tmp_path: Path) -> None:
     publish(tmp_path, "2106", FULL_RIGHT)
-    left = publish(tmp_path, "378", LITE)
-    left.info.write_text(left.info.read_text().replace("right", "left"))
-    left.gains.write_text(left.gains.read_text().replace("joint: rh_", "joint: lh_"))
+    publish(tmp_path, "378", LEFT_LITE)
     broken = publish(tmp_path, "1130", LITE)
     broken.joints.write_text(broken.joints.read_text().replace("FFJ3", "FFJ33"))
     publish(tmp_path, "634", FULL_RIGHT).info.unlink()
