@@ -220,6 +220,32 @@ def test_too_few_wrenches_are_named(change, words):
         fit_fingertip(data.model_copy(update=cut), NOMINAL)
 
 
+def changed(poses, change):
+    """Poses with their wrenches changed by a function of wrench and orientation."""
+    return tuple(
+        pose.model_copy(update={"wrench": tuple(change(np.array(pose.wrench), np.array(pose.world_R_distal)))})
+        for pose in poses
+    )
+
+
+def test_soft_presses_are_named_with_the_softest():
+    data, rng = recorded(), np.random.default_rng(2)
+    soft = wrench(TRUE, np.array(data.presses[0].world_R_distal), 0.25, rng)
+    with pytest.raises(ConfigurationError, match=r"a press of only 0\.1\d N\. Press with"):
+        fit_fingertip(data.model_copy(update={"presses": (*data.presses[1:], soft)}), NOMINAL)
+
+
+def test_forces_that_lie_sideways_fit_no_mounting():
+    data, rng = recorded(), np.random.default_rng(3)
+
+    def slid(reading, _):
+        direction = rng.standard_normal(3)
+        return np.concatenate([2.0 * direction / np.linalg.norm(direction), reading[3:]])
+
+    with pytest.raises(ConfigurationError, match=r"forces are \d+ deg off the plate's normal for every mounting"):
+        fit_fingertip(data.model_copy(update={"presses": changed(data.presses, slid)}), NOMINAL)
+
+
 def test_orientations_all_alike_are_named():
     data = recorded()
     with pytest.raises(ConfigurationError, match="all in nearly the same orientation"):
@@ -236,6 +262,17 @@ def test_electrodes_that_are_dead_open_or_noisy_are_named():
     assert "dead" in found[3]
     assert "end of its range" in found[7]
     assert "noisy" in found[11]
+
+
+def test_an_electrode_is_judged_by_the_others_and_by_its_range():
+    counts = 2000.0 + np.where(np.arange(200)[:, None] % 2, 1.0, -1.0) * np.ones(19)
+    counts[:, 4] = 2000.0 + np.where(np.arange(200) % 2, 30.0, -30.0)
+    counts[:, 5] = 3.0 + np.where(np.arange(200) % 2, 1.0, -1.0)
+    found = faulty_electrodes(counts)
+    assert found[4] == "is noisy: 30 counts, the others 1"
+    assert found[5] == "reads 3 counts, at the end of its range: open or short"
+    with pytest.raises(ConfigurationError, match="samples, .* needed"):
+        faulty_electrodes(counts[:5])
 
 
 def test_a_touched_biotac_is_refused():
