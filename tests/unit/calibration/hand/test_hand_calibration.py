@@ -271,7 +271,7 @@ def test_an_electrode_is_judged_by_the_others_and_by_its_range():
     found = faulty_electrodes(counts)
     assert found[4] == "is noisy: 30 counts, the others 1"
     assert found[5] == "reads 3 counts, at the end of its range: open or short"
-    with pytest.raises(ConfigurationError, match="samples, .* needed"):
+    with pytest.raises(ConfigurationError, match=r"5 samples, \d+ needed"):
         faulty_electrodes(counts[:5])
 
 
