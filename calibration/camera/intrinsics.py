@@ -115,8 +115,9 @@ def _solve(views: Sequence[BoardView], third_radial: bool) -> _Solution:
             points, pixels, size, np.eye(3), np.zeros(5), flags=flags
         )
     except cv2.error as error:
-        hint = "Show the board in more positions and tilts"
-        raise ConfigurationError("no lens fits the views", where="camera calibration", hint=hint) from error
+        raise _no_lens() from error
+    if not np.isfinite(sigmas).all():
+        raise _no_lens(f" (reprojection error {rms:.1f} px)")
     lens = CameraCalibration(
         focal_px=(float(matrix[0, 0]), float(matrix[1, 1])),
         centre_px=(float(matrix[0, 2]), float(matrix[1, 2])),
@@ -126,6 +127,11 @@ def _solve(views: Sequence[BoardView], third_radial: bool) -> _Solution:
     free = len(PARAMETERS) if third_radial else len(PARAMETERS) - 1
     named = dict(zip(PARAMETERS[:free], np.ravel(sigmas).tolist(), strict=False))
     return _Solution(lens, named, np.ravel(per_view), float(rms))
+
+
+def _no_lens(figures: str = "") -> ConfigurationError:
+    hint = "Compare the board with its description; show it in more positions and tilts"
+    return ConfigurationError(f"no lens fits the views{figures}", where="camera calibration", hint=hint)
 
 
 def _without_outliers(views: Sequence[BoardView], solution: _Solution) -> tuple[list[BoardView], dict[str, float]]:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import cv2
 import numpy as np
 
 from drivers.camera.board_pose import board_pose
@@ -24,6 +25,7 @@ _TILTED_rad, _FLAT_rad = np.radians(15.0), np.radians(12.0)
 _NEAR_TO_FAR = 1.4
 _NEWS = 0.12
 _LARGEST_BLUR_px = 2.5
+_LARGEST_BEND = 0.04  # of the board's diagonal in the picture; lenses of 90 degrees bend it by 0.02
 _ROWS, _COLUMNS = ("top", "middle", "bottom"), ("left", "centre", "right")
 _TILTS = ("away at the right", "away at the left", "away at the bottom", "away at the top")
 
@@ -82,8 +84,19 @@ def view_of(name: str, image: Image, board: AnyBoard) -> BoardView | str:
     points, pixels = board.match_corners(image)
     if len(points) < min(LEAST_CORNERS, board.point_count):
         return f"only {len(points)} corners of the board are visible, {LEAST_CORNERS} are needed"
+    if _bend(points, pixels) > _LARGEST_BEND:
+        return "its corners lie elsewhere than the description says: count its columns and rows"
     size = (image.shape[1], image.shape[0])
     return BoardView(name, points, pixels, size, max(board.size_m) * board.scale)
+
+
+def _bend(points_m: Array, pixels: Array) -> float:
+    """How far corners are from any perspective view of the board, as a share of its diagonal in the picture."""
+    to_picture, _ = cv2.findHomography(points_m[:, :2], pixels)
+    if to_picture is None:
+        return float("inf")
+    off_px = cv2.perspectiveTransform(points_m[:, None, :2], to_picture)[:, 0] - pixels
+    return float(np.sqrt(np.mean(np.sum(off_px**2, axis=1))) / np.linalg.norm(np.ptp(pixels, axis=0)))
 
 
 def adds_something(view: BoardView, views: Sequence[BoardView]) -> bool:

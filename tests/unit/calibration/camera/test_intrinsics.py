@@ -56,6 +56,16 @@ def test_a_view_that_disagrees_is_left_out_and_named() -> None:
     assert result.passed, result.problems
 
 
+def test_views_that_no_lens_fits_give_no_figures() -> None:
+    rng = np.random.default_rng(1)
+    scattered = [
+        BoardView(f"{n}", BOARD.corners_m, rng.uniform(0, 480, (len(BOARD.corners_m), 2)), (640, 480), 0.2)
+        for n in range(8)
+    ]
+    with pytest.raises(ConfigurationError, match=r"no lens fits the views \(reprojection error .* px\)"):
+        calibrate_lens(scattered)
+
+
 def test_few_views_all_alike_fail_with_what_is_missing() -> None:
     rng, pose = np.random.default_rng(0), board_poses(BOARD, LENS, 1, np.random.default_rng(3))[0]
     exact = LENS.project(transform_points(pose, BOARD.corners_m))

@@ -51,6 +51,14 @@ def test_a_mirror_image_is_never_read(target: Target) -> None:
     assert np.linalg.det(mapping[:2, :2] / mapping[2, 2]) < 0  # y is up on the print and down in the picture
 
 
+def test_columns_and_rows_that_were_confused_are_told_by_every_picture() -> None:
+    rng = np.random.default_rng(0)
+    printed, described = AprilGrid(columns=6, rows=5), AprilGrid(columns=5, rows=6)
+    for pose in board_poses(printed, LENS, 5, rng):
+        told = view_of("a", draw_board(printed, pose, LENS, rng), described)
+        assert told == "its corners lie elsewhere than the description says: count its columns and rows"
+
+
 @pytest.mark.parametrize("target", TARGETS[::2], ids=named)
 def test_blur_and_absence_are_told_in_words(target: Target) -> None:
     rng = np.random.default_rng(0)
