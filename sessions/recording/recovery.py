@@ -10,6 +10,7 @@ from __future__ import annotations
 import shutil
 from collections import Counter, deque
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,6 +58,7 @@ class Recovery:
         loss: what could not be read.
         left_out: results folders of the old session, by name, which are not copied: they belong to another recording
             than the new one.
+        calibrations_lost: files of calibrations that are damaged or missing both in the folder and in the recording.
     """
 
     source: Path
@@ -64,11 +66,17 @@ class Recovery:
     topics: dict[str, TopicRecovery]
     loss: Loss
     left_out: tuple[str, ...] = ()
+    calibrations_lost: tuple[str, ...] = ()
 
     @property
     def lossy(self) -> bool:
         """Whether anything was lost."""
-        return bool(self.loss)
+        return bool(self.loss or self.calibrations_lost)
+
+    def describe(self) -> str:
+        """What was lost in words; empty if nothing was."""
+        lost = [f"no sound copy of {name}" for name in self.calibrations_lost]
+        return "; ".join(filter(None, (self.loss.describe(), *lost)))
 
 
 def recover(source: Path, root: Path | None = None) -> Recovery:
@@ -99,13 +107,15 @@ def recover(source: Path, root: Path | None = None) -> Recovery:
 
 
 def _recover_into(folder: Path, source: Path, manifest: Manifest, reader: TrafficReader) -> Recovery:
+    calibrations = _calibrations(source, manifest, reader)
     with writing_into(folder):
-        _copy_files(source, folder, reader)
-    written, topics = _copy_traffic(reader, folder)
+        _copy_files(source, folder, calibrations)
+    written, topics = _copy_traffic(reader, folder, _stored_files(source, reader, calibrations))
     if not written:
         raise SessionDataError("contains no readable message", where=str(reader.path), hint="Nothing can be recovered")
     _count_again(folder, written)
-    recovery = Recovery(source, folder, topics, reader.loss, _result_folders(source))
+    lost = tuple(copy.file for copy in manifest.calibration.values() if copy.file not in calibrations)
+    recovery = Recovery(source, folder, topics, reader.loss, _result_folders(source), lost)
     write_manifest(folder, _recovered_manifest(manifest, folder, written, recovery))
     return recovery
 
@@ -127,7 +137,25 @@ def _read_through(reader: TrafficReader) -> bool:
     return bool(reader.loss)
 
 
-def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
+def _calibrations(source: Path, manifest: Manifest, reader: TrafficReader) -> dict[str, bytes]:
+    """Calibration files as they were when the session began, by name: the recording's, or else the folder's copies."""
+    parts = [(*one.name.rpartition("/"), one.data) for one in reader.attachments()]
+    stored = {name: content for kept, _, name, content in parts if kept == CALIBRATION}
+    for role, copy in manifest.calibration.items():
+        if copy.file not in stored:
+            with suppress(SessionDataError):
+                stored[copy.file] = Session(source, manifest).calibration_file(role).read_bytes()
+    return stored
+
+
+def _stored_files(source: Path, reader: TrafficReader, calibrations: dict[str, bytes]) -> tuple[Attached, ...]:
+    """What the new recording stores: the description as it was when the session began, or else as it is now."""
+    told = [one.data for one in reader.attachments() if one.name == MANIFEST] or [(source / MANIFEST).read_bytes()]
+    files = {MANIFEST: told[0], **{f"{CALIBRATION}/{name}": content for name, content in calibrations.items()}}
+    return tuple(Attached(name, "application/yaml", content) for name, content in files.items())
+
+
+def _copy_files(source: Path, folder: Path, calibrations: dict[str, bytes]) -> None:
     """Copy all files but recording, manifest, results, links, pipes and devices; calibrations are the recording's."""
     for item in sorted(source.iterdir()):
         if _is_special(item) or item.name == MANIFEST or item.suffix in (".mcap", ".part") or _holds_results(item):
@@ -138,10 +166,8 @@ def _copy_files(source: Path, folder: Path, reader: TrafficReader) -> None:
         else:
             shutil.copyfile(item, folder / item.name)
     (folder / CALIBRATION).mkdir(exist_ok=True)
-    for attachment in reader.attachments():
-        kept, _, name = attachment.name.rpartition("/")
-        if kept == CALIBRATION:
-            write_whole(folder / CALIBRATION / name, attachment.data)
+    for name, content in calibrations.items():
+        write_whole(folder / CALIBRATION / name, content)
 
 
 def _copy_file(source: str, copy: str) -> None:
@@ -168,8 +194,9 @@ def _result_folders(source: Path) -> tuple[str, ...]:
     return tuple(sorted(path.parent.relative_to(source).as_posix() for path in source.rglob(TRAJECTORY)))
 
 
-def _copy_traffic(reader: TrafficReader, folder: Path) -> tuple[Counter[str], dict[str, TopicRecovery]]:
-    attached = tuple(Attached(item.name, item.media_type, item.data) for item in reader.attachments())
+def _copy_traffic(
+    reader: TrafficReader, folder: Path, attached: tuple[Attached, ...]
+) -> tuple[Counter[str], dict[str, TopicRecovery]]:
     info = {key: value for key, value in reader.info.items() if key not in ("format", "segment")}
     settings = TrafficSettings(tell_streams=False, tail=False)
     writer = TrafficWriter(folder / TRAFFIC, info, attachments=attached, settings=settings)
@@ -225,7 +252,7 @@ def _count_again(folder: Path, written: Counter[str]) -> None:
 
 def _recovered_manifest(manifest: Manifest, folder: Path, written: Counter[str], recovery: Recovery) -> Manifest:
     lost = {f"lost {topic}": item.lost for topic, item in recovery.topics.items() if item.lost}
-    described = recovery.loss.describe()
+    described = recovery.describe()
     return manifest.model_copy(
         update={
             "name": folder.name,

@@ -30,7 +30,7 @@ from sessions.recording.traffic.loss import Loss
 from sessions.recording.traffic.mcap_frames import DAMAGE, Frames
 from sessions.recording.traffic.mcap_summary import read_summary
 from sessions.recording.traffic.raw_frames import UNSTAMPED, DeviceStamp
-from sessions.recording.traffic.segment import UNREADABLE, SegmentMessages, open_segment
+from sessions.recording.traffic.segment import UNREADABLE, SegmentMessages, open_segment, stored_file
 from sessions.recording.traffic.tail import read_tail
 
 
@@ -117,16 +117,13 @@ class TrafficReader:
         return found if isinstance(found, dict) else {}
 
     def attachments(self) -> Iterator[Attachment]:
-        """The files stored inside the recording. Raises SessionError."""
+        """The files stored inside the recording that are as they were. Raises SessionError."""
         with open_segment(self.path) as file:
             for opcode, content in Frames(file):
                 if opcode == Opcode.CHUNK:
                     return
-                if opcode == Opcode.ATTACHMENT:
-                    try:
-                        yield Attachment.read(ReadDataStream(BytesIO(content)))
-                    except UNREADABLE as error:
-                        raise SessionDataError(f"an attachment is damaged ({error})", where=str(self.path)) from error
+                if opcode == Opcode.ATTACHMENT and (stored := stored_file(content)) is not None:
+                    yield stored
 
     def _as_now(self, topic: str, message: Message) -> TrafficMessage:
         """A message in the present format, without its envelope."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from collections import Counter
 from collections.abc import Collection, Iterator
 from io import BytesIO
@@ -13,7 +14,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord, Message, MessageIndex, Metadata
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, MessageIndex, Metadata
 
 from drivers.core.errors import SessionDataError
 from drivers.core.reading.bounded_files import open_plain
@@ -100,6 +101,8 @@ class SegmentMessages:
                 times = [stamp_ns for stamp_ns, _ in index.records]
                 if times != self._times_in_last_chunk(index.channel_id):
                     self._indexed[index.channel_id] += len(times)  # of a chunk that could not be read
+            elif opcode == Opcode.ATTACHMENT:
+                self._loss.damaged_files += stored_file(content) is None
             elif opcode == Opcode.METADATA:
                 found = Metadata.read(ReadDataStream(BytesIO(content)))
                 self.end = found.metadata if found.name == END_RECORD else self.end
@@ -121,6 +124,18 @@ class SegmentMessages:
     def _times_in_last_chunk(self, channel: int) -> list[int]:
         messages = (record for record in self._last_chunk if isinstance(record, Message))
         return [message.log_time for message in messages if message.channel_id == channel]
+
+
+def stored_file(content: bytes) -> Attachment | None:
+    """A file that is stored in a recording, by its record's content; None if it is not as it was by its checksum."""
+    (checksum,) = struct.unpack("<I", content[-4:].rjust(4, b"\0"))
+    if checksum not in (0, zlib.crc32(content[:-4])):  # 0: there is none
+        return None
+    try:
+        found: Attachment = Attachment.read(ReadDataStream(BytesIO(content)))
+    except UNREADABLE:
+        return None
+    return found
 
 
 def open_segment(path: Path) -> BinaryIO:

@@ -74,7 +74,7 @@ def show_recovery(recovery: Recovery) -> None:
         kept = f"results of the damaged session stay there ({', '.join(recovery.left_out)})"
         say(f"{kept}; make new ones with: tactile-lab session replay {recovery.folder}", "yellow")
     if recovery.lossy:
-        warn(f"lost: {recovery.loss.describe()}")
+        warn(f"lost: {recovery.describe()}")
     else:
         answer("nothing was lost", "green")
 
@@ -85,7 +85,7 @@ def recovery_document(recovery: Recovery) -> dict[str, Any]:
         "source": str(recovery.source),
         "session": None if recovery.folder is None else str(recovery.folder),
         "lossy": recovery.lossy,
-        "loss": recovery.loss.describe(),
+        "loss": recovery.describe(),
         "left_out": list(recovery.left_out),
         "topics": {topic: asdict(item) for topic, item in recovery.topics.items()},
     }

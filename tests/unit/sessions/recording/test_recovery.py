@@ -129,6 +129,41 @@ def test_calibrations_of_a_whole_session_come_back_from_its_recording(tmp_path, 
     assert not recovery.lossy
 
 
+def spoil(folder, content):
+    """One wrong bit where the recording stores this."""
+    traffic = folder / "traffic.mcap"
+    changed = bytearray(traffic.read_bytes())
+    changed[changed.index(content)] ^= 4
+    traffic.write_bytes(changed)
+
+
+@pytest.mark.parametrize("content", [b"a: 1\n", b"status: open"])
+def test_a_wrong_bit_in_a_file_that_the_recording_stores_is_told_and_spoils_no_sound_copy(tmp_path, content):
+    joints = tmp_path / "joints.yaml"
+    joints.write_text("a: 1\n")
+    folder = record(tmp_path / "runs", calibration=joints)
+    spoil(folder, content)
+    recovery = recover(folder)
+    assert recovery.lossy
+    assert recovery.describe() == "1 damaged file stored in it"
+    assert Session.open(recovery.folder).calibration_file("joints").read_text() == "a: 1\n"
+    stored = [one.name for one in Session.open(recovery.folder).traffic().attachments()]
+    assert stored == ["session.yaml", "calibration/joints.yaml"]
+    assert not recover(recovery.folder).lossy
+
+
+def test_a_calibration_without_any_sound_copy_is_told(tmp_path):
+    joints = tmp_path / "joints.yaml"
+    joints.write_text("a: 1\n")
+    folder = record(tmp_path / "runs", calibration=joints)
+    spoil(folder, b"a: 1\n")
+    (folder / "calibration" / "joints.yaml").unlink()
+    recovery = recover(folder)
+    assert recovery.calibrations_lost == ("joints.yaml",)
+    assert recovery.describe() == "1 damaged file stored in it; no sound copy of joints.yaml"
+    assert "no sound copy of joints.yaml" in read_manifest(recovery.folder).problem
+
+
 def test_a_session_without_its_recording_promises_no_recovery(tmp_path):
     joints = tmp_path / "joints.yaml"
     joints.write_text("a: 1\n")
