@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import hmac
 import ipaddress
 import re
@@ -22,6 +23,7 @@ from http import HTTPStatus
 from tactile_lab.view.inner_door import InnerDoor
 
 COOKIE = "tactile_lab_token"
+"""Begins a cookie's name. Browsers keep one of a name for all ports of a computer, so each token has its own."""
 _HEAD_BYTES, _HEAD_TIMEOUT_s, _BLOCK = 16_384, 10.0, 65_536
 
 
@@ -70,6 +72,7 @@ class Gate:
     def __init__(self, names: frozenset[str] | None, token: str, *, encrypted: bool = False) -> None:
         assert names is not None or token
         self._names, self._token = names, token
+        self._cookie = f"{COOKIE}_{hashlib.sha256(token.encode()).hexdigest()[:12]}={token}"
         self._marks = "HttpOnly; SameSite=Strict; Path=/" + ("; Secure" if encrypted else "")
 
     def verdict(self, head: Head) -> tuple[HTTPStatus, str]:
@@ -82,11 +85,11 @@ class Gate:
             return HTTPStatus.FORBIDDEN, "the request comes from another web site"
         if not self._token:
             return HTTPStatus.OK, ""
-        if self._same(_cookie(head.headers.get("cookie", ""))):
+        if any(self._same(shown) for shown in _cookies(head.headers.get("cookie", ""))):
             return HTTPStatus.OK, ""
         shown = re.search(r"[?&]token=([A-Za-z0-9_-]+)", head.path)
         if shown and self._same(shown[1]):
-            return HTTPStatus.SEE_OTHER, f"{COOKIE}={self._token}; {self._marks}"
+            return HTTPStatus.SEE_OTHER, f"{self._cookie}; {self._marks}"
         return HTTPStatus.FORBIDDEN, "the token is missing or wrong: use the address that the session printed"
 
     def _same(self, shown: str) -> bool:
@@ -99,12 +102,10 @@ def _host_name(host: str) -> str:
     return host.partition(":")[0].lower()
 
 
-def _cookie(header: str) -> str:
-    for part in header.split(";"):
-        name, _, value = part.strip().partition("=")
-        if name == COOKIE:
-            return value
-    return ""
+def _cookies(header: str) -> list[str]:
+    """The tokens that a visitor has, of this page and of others on this computer."""
+    pairs = (part.strip().partition("=") for part in header.split(";"))
+    return [value for name, _, value in pairs if name.startswith(COOKIE)]
 
 
 async def serve(

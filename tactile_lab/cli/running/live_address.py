@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
+from urllib.parse import urlsplit
 
 import typer
 
@@ -52,11 +53,28 @@ class LiveAddress:
 
     @classmethod
     def if_wanted(cls, live: bool, rig: str, port: int, token: str, origin: str) -> LiveAddress | None:
-        """The address if viewers are wanted. Raises BadParameter for an option that needs them."""
+        """The address if viewers are wanted. Raises BadParameter for an option that needs them, or an origin that
+        no browser sends."""
         for option, given in (("--live-port", port != LIVE_PORT), ("--live-origin", bool(origin))):
             if given and not live:
                 raise typer.BadParameter("needs --live", param_hint=f"'{option}'")
+        if origin and not _is_origin(origin):
+            what = "must be a web address without a path, such as https://lichtblick.example.org"
+            raise typer.BadParameter(what, param_hint="'--live-origin'")
         return cls(rig, port, token, origin) if live else None
+
+
+def _is_origin(text: str) -> bool:
+    """Whether browsers send such a text as the origin of a web application, a slash at its end apart."""
+    try:
+        parts = urlsplit(text.rstrip("/"))
+    except ValueError:
+        return False
+    return (
+        parts.scheme in ("http", "https")
+        and bool(parts.hostname)
+        and f"{parts.scheme}://{parts.netloc}" == text.rstrip("/")
+    )
 
 
 @contextmanager

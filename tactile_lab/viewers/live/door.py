@@ -33,7 +33,7 @@ class Door:
         if origin is not None and not self._is_known(origin):
             return f"The viewer comes from another web site, {origin[:80]}: allow it with --live-origin."
         shown = parse_qs(urlsplit(path).query).get("token", [""])[-1]
-        if not hmac.compare_digest(shown.encode(), self.token.encode()):
+        if not hmac.compare_digest(shown.encode(errors="replace"), self.token.encode()):
             return "The token is missing or wrong: use the address that the session printed."
         return ""
 

@@ -142,7 +142,7 @@ class LiveServer:
 
     def _take(self, viewer: Viewer, text: str) -> None:
         """Process a request; one that is invalid, or asks for more than to watch, is ignored."""
-        with contextlib.suppress(ValueError, KeyError, TypeError, AttributeError):
+        with contextlib.suppress(ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError):
             content = json.loads(text)
             if content["op"] == "subscribe":
                 for one in content["subscriptions"]:

@@ -244,6 +244,16 @@ def test_token_is_asked_for_once_and_then_in_the_cookie() -> None:
     assert door.verdict(head(cookie="tactile_lab_token=wrong"))[0] is HTTPStatus.FORBIDDEN
 
 
+def test_pages_of_two_sessions_stay_open_in_one_browser() -> None:
+    """It keeps one cookie of a name for all ports of a computer."""
+    doors, kept = [gate(TOKEN), gate(TOKEN[::-1])], dict[str, str]()
+    for door, token in zip(doors, (TOKEN, TOKEN[::-1]), strict=True):
+        name, _, value = door.verdict(head(f"/?token={token}"))[1].partition(";")[0].partition("=")
+        kept[name] = value
+    cookie = "; ".join(f"{name}={value}" for name, value in kept.items())
+    assert [door.verdict(head(cookie=cookie))[0] for door in doors] == [HTTPStatus.OK, HTTPStatus.OK]
+
+
 @pytest.mark.parametrize("data", [b"", b"\x00\xff\r\n\r\n", b"POST / HTTP/1.1\r\n\r\n", b"GET /\r\n\r\n"])
 def test_what_is_no_page_request_is_none(data: bytes) -> None:
     assert parse_head(data) is None

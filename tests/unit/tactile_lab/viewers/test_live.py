@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import base64
 import json
+import socket
 import struct
 import time
 from collections.abc import Iterator
 from typing import Any
+from urllib.parse import urlsplit
 
 import foxglove
 import pytest
@@ -54,17 +56,17 @@ def _threads_of_the_feed_begin_before_a_test_counts_them(feed: LiveFeed) -> None
 def received(url: str, wanted: set[str], protocol: str = "foxglove.sdk.v1") -> dict[str, tuple[str, Any]]:
     """Schema and first message of each wanted topic, as any client of the protocol reads them."""
     found: dict[str, tuple[str, Any]] = {}
-    with connect(url, subprotocols=[protocol], max_size=None, open_timeout=PATIENCE_s) as socket:
-        assert socket.subprotocol == protocol
+    with connect(url, subprotocols=[protocol], max_size=None, open_timeout=PATIENCE_s) as viewer:
+        assert viewer.subprotocol == protocol
         channels: dict[int, dict[str, Any]] = {}
         while set(found) < wanted:
-            frame = socket.recv(PATIENCE_s)
+            frame = viewer.recv(PATIENCE_s)
             if isinstance(frame, str):
                 for one in json.loads(frame).get("channels", ()):
                     if one["topic"] in wanted:
                         channels[one["id"]] = one
                         ask = {"op": "subscribe", "subscriptions": [{"id": one["id"] + 100, "channelId": one["id"]}]}
-                        socket.send(json.dumps(ask))
+                        viewer.send(json.dumps(ask))
             else:
                 operation, subscription, _ = struct.unpack_from("<BIQ", frame)
                 assert operation == 1
@@ -103,15 +105,15 @@ def test_the_same_client_reads_foxglove_s_own_server():
     try:
         channel = foxglove.channels.PoseInFrameChannel("/object/pose", context=context)
         url = f"ws://127.0.0.1:{server.port}"
-        with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE_s) as socket:
-            told = [json.loads(socket.recv(PATIENCE_s)) for _ in range(2)]
+        with connect(url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE_s) as viewer:
+            told = [json.loads(viewer.recv(PATIENCE_s)) for _ in range(2)]
             assert [one["op"] for one in told] == ["serverInfo", "advertise"]
             (theirs,) = told[1]["channels"]
-            socket.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": theirs["id"]}]}))
+            viewer.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 7, "channelId": theirs["id"]}]}))
             while not channel.has_sinks():
                 time.sleep(0.01)
             channel.log(foxglove.messages.PoseInFrame(frame_id="world"), log_time=5)
-            frame = socket.recv(PATIENCE_s)
+            frame = viewer.recv(PATIENCE_s)
         assert struct.unpack_from("<BIQ", frame) == (1, 7, 5)
         assert decoded(theirs, frame[13:]).frame_id == "world"
     finally:
@@ -119,8 +121,8 @@ def test_the_same_client_reads_foxglove_s_own_server():
 
 
 def test_our_announcement_has_the_fields_of_foxglove_s_own(feed):
-    with connect(feed.url, subprotocols=["foxglove.websocket.v1"], open_timeout=PATIENCE_s) as socket:
-        info, announced = (json.loads(socket.recv(PATIENCE_s)) for _ in range(2))
+    with connect(feed.url, subprotocols=["foxglove.websocket.v1"], open_timeout=PATIENCE_s) as viewer:
+        info, announced = (json.loads(viewer.recv(PATIENCE_s)) for _ in range(2))
     assert (info["op"], info["name"], info["capabilities"]) == ("serverInfo", "told", [])
     assert {frozenset(one) for one in announced["channels"]} == {
         frozenset({"id", "topic", "encoding", "schemaName", "schema", "schemaEncoding"})
@@ -128,8 +130,8 @@ def test_our_announcement_has_the_fields_of_foxglove_s_own(feed):
 
 
 def test_the_truth_is_not_for_those_who_watch(feed):
-    with connect(feed.url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE_s) as socket:
-        _, announced = (json.loads(socket.recv(PATIENCE_s)) for _ in range(2))
+    with connect(feed.url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE_s) as viewer:
+        _, announced = (json.loads(viewer.recv(PATIENCE_s)) for _ in range(2))
     assert not [one["topic"] for one in announced["channels"] if "truth" in one["topic"]]
 
 
@@ -153,6 +155,12 @@ def test_strangers_are_refused_in_one_sentence(feed, origin, token, words):
     assert answer.body.decode().count("\n") == 1
 
 
+def test_a_token_in_no_encoding_is_a_wrong_one(feed):
+    with socket.create_connection(("127.0.0.1", urlsplit(feed.url).port), timeout=PATIENCE_s) as raw:
+        raw.sendall(b"GET /?token=\xe9 HTTP/1.1\r\nHost: localhost\r\n\r\n")
+        assert raw.recv(4096).startswith(b"HTTP/1.1 403 ")
+
+
 @pytest.mark.parametrize(
     "origin", ["https://app.foxglove.dev", "http://localhost:8080", "file://", "https://lab.example"]
 )
@@ -161,17 +169,20 @@ def test_known_viewers_are_let_in(origin):
 
 
 def test_requests_that_are_none_are_ignored(feed):
-    with connect(feed.url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE_s) as socket:
+    with connect(feed.url, subprotocols=["foxglove.sdk.v1"], open_timeout=PATIENCE_s) as viewer:
         for text in (
             "",
             "[]",
             "{}",
             '{"op":"subscribe"}',
             '{"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]}',
+            '{"op":"subscribe","subscriptions":[{"id":1e999,"channelId":1}]}',
+            60_000 * "[",
         ):
-            socket.send(text)
-        socket.send(b"\x01binary")
-        socket.send('{"op":"unsubscribe","subscriptionIds":[5]}')
+            viewer.send(text)
+        viewer.send(b"\x01binary")
+        viewer.send('{"op":"unsubscribe","subscriptionIds":[5]}')
+        assert viewer.ping().wait(PATIENCE_s)  # it is still connected
     assert received(feed.url, {"/tf_static"})
 
 
@@ -185,12 +196,12 @@ def test_a_viewer_that_does_not_read_delays_neither_the_session_nor_others(feed)
 
 def stuck(feed: LiveFeed) -> ClientConnection:
     """A viewer that subscribes to everything and never reads again."""
-    socket = connect(
+    viewer = connect(
         feed.url, subprotocols=["foxglove.sdk.v1"], max_queue=1, open_timeout=PATIENCE_s, close_timeout=0.1
     )
     asked = [{"id": number, "channelId": number} for number in range(1, 30)]
-    socket.send(json.dumps({"op": "subscribe", "subscriptions": asked}))
-    return socket
+    viewer.send(json.dumps({"op": "subscribe", "subscriptions": asked}))
+    return viewer
 
 
 def test_of_what_passes_the_oldest_gives_way_and_of_what_lasts_the_newest_stays():
@@ -230,3 +241,20 @@ def test_options_of_the_server_need_the_server(port, origin):
     with pytest.raises(typer.BadParameter, match="needs --live"):
         LiveAddress.if_wanted(False, "sim", port, "", origin)
     assert LiveAddress.if_wanted(False, "sim", LIVE_PORT, "", "") is None
+
+
+@pytest.mark.parametrize(
+    "origin", ["lichtblick.example.org", "https://", "lab:8080", "https://lab.example/viewer", "http://["]
+)
+def test_an_origin_that_no_browser_sends_is_refused(origin):
+    with pytest.raises(typer.BadParameter, match=r"https://lichtblick\.example\.org"):
+        LiveAddress.if_wanted(True, "sim", LIVE_PORT, "", origin)
+
+
+@pytest.mark.parametrize(
+    "origin", ["https://lab.example", "https://lab.example/", "http://lab:8080", "http://[::1]:80"]
+)
+def test_an_origin_is_a_scheme_and_a_name(origin):
+    wanted = LiveAddress.if_wanted(True, "sim", LIVE_PORT, "", origin)
+    assert wanted is not None
+    assert wanted.origin == origin
