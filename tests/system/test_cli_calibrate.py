@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from importlib import resources
 from pathlib import Path
@@ -187,5 +188,12 @@ def test_poses_of_another_program_are_solved_for_a_hand_of_any_form(inside, tmp_
         "calibrate", "forearm", "--rig", "sim-lite", "--from", source, "--out", tmp_path / "found.yaml", "--no-input"
     )
     assert answer.code == 0, answer.err
+    for told in (
+        r"print +[-+]0\.\d\d \+- .* % larger than stated",
+        r"delay +50\d\d\.",
+        r"Shah +\d.* deg away",
+        "Park and Martin ",
+    ):
+        assert re.search(told, answer.out), told
     details = read_record(tmp_path / "found.yaml").details
     assert details["delay_s"] == pytest.approx(5.0, abs=0.01)  # the hand's stream began 5 s sooner

@@ -71,7 +71,10 @@ def test_a_stop_of_the_arm_ends_the_session_in_order_and_the_next_one_runs(
 
 
 class Leader:
-    """A person who pushes the arm in every stage of a grasp, half a second each, then gives the grasp up and ends."""
+    """A person who pushes the arm once in every stage of a grasp, then gives the grasp up and ends.
+
+    Each key is pressed every half a second until the stage is over: fingertips that still swing are not zeroed.
+    """
 
     attended = True
     _answers: tuple[tuple[Stage, Ask], ...] = (
@@ -90,6 +93,8 @@ class Leader:
 
     def show(self, panel: Panel) -> None:
         if panel.stage != self._stage:
+            if self._left and self._left[0][0] == self._stage:
+                del self._left[0]
             self._stage, self._cycles = panel.stage, 0
 
     def requests(self) -> Sequence[Request]:
@@ -98,7 +103,7 @@ class Leader:
             return []
         if self._cycles == 25:
             self._push()
-        return [Request(self._left.pop(0)[1])] if self._cycles == 50 else []
+        return [Request(self._left[0][1])] if self._cycles % 50 == 0 else []
 
 
 def heights_m(folder: Path) -> tuple[Array, Array]:
@@ -119,9 +124,9 @@ def test_a_person_leads_the_arm_while_guiding_and_opening_and_at_no_other_time(
     outcome, folder = run(rig, laboratory, tmp_path, At(), attendance=Attendance(leader, True, "hand"))
     assert outcome.ending is Ending.COMPLETE, outcome.reason
     heights, is_free = heights_m(folder)
-    begins = np.flatnonzero(np.diff(is_free.astype(int)) > 0)
-    assert len(begins) == 2  # guided, opened
-    jumps = np.flatnonzero(np.abs(np.diff(heights)) > 0.015)
-    assert len(jumps) == 2
-    assert is_free[jumps].all()
-    np.testing.assert_allclose(heights[-1] - heights[begins[0]], 0.04, atol=1e-3)
+    changes = np.flatnonzero(np.diff(is_free.astype(int)))
+    assert len(changes) == 4  # free while guided and while opened
+    led_m = heights[changes[1::2]] - heights[changes[::2]]
+    np.testing.assert_allclose(led_m, 0.02, atol=0.002)
+    held = ~(is_free[1:] | is_free[:-1])
+    assert np.abs(np.diff(heights))[held].max() < 1e-3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -230,7 +231,23 @@ def _show_pose(result: ForearmResult) -> None:
             facts.append(
                 (f"offset of {joint}", f"{degrees(offset.offset_rad):+.2f} +- {degrees(offset.sigma_rad):.2f} deg")
             )
-    show_facts("Result", facts)
+    show_facts("Result", facts + _of_pairs(result.solution.numbers))
+
+
+def _of_pairs(numbers: Mapping[str, float]) -> list[tuple[str, str]]:
+    """What pairs of poses tell besides the pose, and how far away closed forms are, which trust the print."""
+    facts = []
+    if "print_larger_share" in numbers:
+        share, sigma = 100 * numbers["print_larger_share"], 100 * numbers["print_larger_sigma"]
+        facts.append(("print", f"{share:+.2f} +- {sigma:.2f} % larger than stated"))
+    if "delay_s" in numbers:
+        facts.append(("delay", f"{1e3 * numbers['delay_s']:.2f} +- {1e3 * numbers['delay_sigma_s']:.2f} ms"))
+    closed = (("Shah", "shah"), ("Park and Martin", "park_martin"))
+    return facts + [
+        (words, f"{numbers[f'{name}_mm_away']:.2f} mm, {numbers[f'{name}_deg_away']:.2f} deg away")
+        for words, name in closed
+        if f"{name}_mm_away" in numbers
+    ]
 
 
 def _three(values: list[float], unit: str) -> str:
