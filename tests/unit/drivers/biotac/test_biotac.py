@@ -219,6 +219,14 @@ def test_a_touch_becomes_a_contact_in_the_distal_frame(tip: BioTac) -> None:
     assert math.sqrt(spread) < math.sqrt(np.linalg.eigvalsh(contact.point_covariance_m2)[-1]) / 2
 
 
+def test_before_a_tare_nothing_is_known_to_touch(tip: BioTac) -> None:
+    layout, finger = electrode_layout(19), Finger(tip)
+    tip.begin_capture()
+    finger.feed(pressed(layout.skin.project(layout.positions_m)[0], np.array([-0.003, 0.0, -0.007])))
+    assert tip.contact(UPRIGHT) is None
+    assert tip.newest_contact() is None
+
+
 def test_squeezed_electrodes_without_pressure_are_no_contact(tip: BioTac) -> None:
     finger, layout = Finger(tip), electrode_layout(19)
     finger.feed(REST)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from fsspec.implementations.memory import MemoryFileSystem
 
-from drivers.core.errors import ConfigurationError, WriteError
+from drivers.core.errors import ConfigurationError, SessionError, WriteError
 from sessions.exchange.addresses import Place, address_of, checked_name, refuse_unwritable_anywhere
 from sessions.exchange.elsewhere import fetch_session, list_elsewhere, store_session
 from sessions.recording.listing import list_sessions
@@ -88,6 +88,14 @@ def test_what_is_fetched_in_part_leaves_nothing_here(closed, tmp_path, monkeypat
 
     monkeypatch.setattr(MemoryFileSystem, "get_file", torn)
     with pytest.raises(WriteError, match="one may not read or write there"):
+        fetch_session(address, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_session_whose_record_is_damaged_elsewhere_is_refused_and_leaves_nothing_here(closed, tmp_path):
+    address = store_session(closed, HERE)
+    MemoryFileSystem().pipe_file(f"{address.removeprefix('memory:/')}/session.yaml", b"colour: red\n")
+    with pytest.raises(SessionError, match="unknown key"):
         fetch_session(address, tmp_path)
     assert list(tmp_path.iterdir()) == []
 

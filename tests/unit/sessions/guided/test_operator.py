@@ -80,6 +80,12 @@ def test_prompts_lead_through_every_grasp(tmp_path: Path) -> None:
     ]
 
 
+def test_what_a_request_does_not_say_is_no_step() -> None:
+    move = Request(Ask.MOVE)
+    assert (move.steps, move.x, move.y, move.z, move.turn) == (0, 0, 0, 0, 0)
+    assert (move.fingers, move.text) == ((), "")
+
+
 def test_guided_grasps_are_those_of_the_same_conductor(tmp_path: Path) -> None:
     run = Run(tmp_path, DiscWorld(disc()), SimulatedOperator())
     assert all(len(grasp.contacts) >= 4 for grasp in run.outcome.grasps)
