@@ -45,6 +45,7 @@ def check_calibration(rig: Rig) -> None:
         ConfigurationError: an invalid file, with its name.
     """
     _check_fingers(rig)
+    _check_driven(rig)
     build_interpreter(rig)
     if rig.description.wires is not None:
         hand_setup(rig).check_files()
@@ -68,6 +69,15 @@ def _check_fingers(rig: Rig) -> None:
         raise ConfigurationError(
             what, where=f"{rig.source}: wires.fingertips", hint="Remove what the hand does not have"
         )
+
+
+def _check_driven(rig: Rig) -> None:
+    """Raises ConfigurationError where gains never drive a joint: a straight finger meets everything first."""
+    gains = rig.description.hand.gains if rig.description.wires is None else hand_setup(rig).settings().gains
+    if idle := [name for name in hand_form(rig).driven if gains.of(name).max_pwm == 0.0]:
+        what = f"never drives {', '.join(idle)}, whose largest demand is 0: a grasp needs every joint"
+        where = str(rig.files["gains"]) if "gains" in rig.files else f"{rig.source}: hand.gains"
+        raise ConfigurationError(what, where=where, hint="A rig of kind hand can check and drive the others")
 
 
 def simulated_world(rig: Rig, seed: int, object_name: str) -> SimulatedWorld:

@@ -100,6 +100,16 @@ def test_a_hand_with_two_fingers_cannot_grasp(tmp_path: Path) -> None:
         check_calibration(rig)
 
 
+def test_a_hand_with_a_joint_that_is_never_driven_cannot_grasp(tmp_path: Path) -> None:
+    hand = {"gains": {"exceptions": {"LFJ0": {"pwm_per_rad": 0.0, "max_pwm": 0.0}}}}
+    wired = load_rig(changed(tmp_path, calibration=CALIBRATION, wires=without_camera(tmp_path), hand=hand))
+    sim = load_rig("sim")
+    simulated = replace(sim, description=sim.description.model_copy(update={"hand": HandSettings.model_validate(hand)}))
+    for rig in (wired, simulated):
+        with pytest.raises(ConfigurationError, match=r"hand\.gains: never drives LFJ0, whose largest demand is 0: a"):
+            check_calibration(rig)
+
+
 def test_a_wire_of_a_finger_that_the_hand_does_not_have_is_told(tmp_path: Path) -> None:
     lite = str(shipped_rigs()["sim-lite"].parent / "calibrations" / "simulated-hand" / "motors-lite.yaml")
     calibration = CALIBRATION | {"motors": lite}
