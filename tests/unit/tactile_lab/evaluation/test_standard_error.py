@@ -46,6 +46,7 @@ def test_positions_on_a_line_leave_the_rotation_open() -> None:
     assert found is not None
     assert (found.rmse_mm < 1e-9, found.rmse_deg) == (True, None)
     assert standard_errors(line[:2], line[:2]) is None
+    assert standard_errors(line[:3], line[:3]) is not None
 
 
 def test_points_in_a_plane_are_not_mirrored() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from gtsam import Pose2, Pose3
 
 from drivers.core.errors import SessionError, ShapeError, WriteError
 from tactile_lab.evaluation.files.plain import json_text, plain
-from tactile_lab.evaluation.files.result_files import write_results
+from tactile_lab.evaluation.files.result_files import upright_contour, write_results
 from tactile_lab.evaluation.files.results import read_results
 from tactile_lab.evaluation.files.tables import contacts_text, contour_text, read_contacts, read_contour
 from tactile_lab.evaluation.prism import open_ring, prism, signed_area_m2, triangulate
@@ -106,6 +106,22 @@ def test_planar_session_ends_with_its_contour_stood_upright(tmp_path: Path, reco
     assert mesh.bounds[:, 2] == pytest.approx([-origin_height, highest - origin_height], abs=1e-6)
     assert mesh.volume == pytest.approx(signed_area_m2(contour) * highest, rel=1e-4)
     assert signed_area_m2(contour) == pytest.approx(SIZE_m[0] * SIZE_m[1], rel=0.25)
+
+
+@pytest.mark.parametrize("told", [True, False])
+def test_walls_of_a_contour_are_touched_where_the_contour_is(recorded: Recorded, told: bool) -> None:
+    result = result_of(2)
+    assert result.contour is not None
+    points = result.contour.points_m
+    known = points[:, 0] > points[:, 0].mean() if told else None
+    solid = upright_contour(replace(result, contour=replace(result.contour, known=known)), recorded.grasps)
+    assert solid is not None
+    if known is None:
+        assert solid.known is None
+    else:
+        nearest = np.linalg.norm(solid.vertices[:, None, :2] - points, axis=2).argmin(axis=1)
+        assert solid.known is not None
+        np.testing.assert_array_equal(solid.known, known[nearest])
 
 
 def test_steps_are_told_without_durations(tmp_path: Path, recorded: Recorded) -> None:
