@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -70,6 +72,22 @@ def _until_it_ends(transport: CameraProcess) -> None:
     transport.open()
     while True:
         transport.receive()
+
+
+@pytest.mark.parametrize(
+    ("way", "words"),
+    [(signal.SIGKILL, "camera: its process has ended"), (signal.SIGSTOP, "camera: no picture within 1000 ms")],
+)
+def test_a_process_that_is_killed_or_stands_still_is_told(way: signal.Signals, words: str) -> None:
+    transport = CameraProcess("camera", CameraSourceSettings(source="simulated", size_px=(320, 240)))
+    camera = Camera(transport, MonotonicClock())
+    camera.connect()
+    try:
+        os.kill(transport._child.process_id, way)
+        with pytest.raises(DeviceError, match=words):
+            camera.capture()
+    finally:
+        camera.close()
 
 
 def test_a_camera_that_can_not_be_opened_says_so_before_anything_runs(tmp_path: Path) -> None:
