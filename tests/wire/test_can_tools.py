@@ -49,6 +49,21 @@ def test_the_player_plays_a_log_onto_the_buses(ends: tuple[str, str], tmp_path: 
         assert emulator.order()["can_frames"] == 10
 
 
+def test_the_player_plays_a_log_in_which_another_program_numbered_the_buses(
+    ends: tuple[str, str], tmp_path: Path
+) -> None:
+    log = tmp_path / "vendor.asc"
+    frames = "".join(f"   {0.01 * n:.6f} {1 + n % 2}  {0x604 | n << 5:X}             Tx   d 0\n" for n in range(10))
+    log.write_text("date Mon Nov 23 12:00:00.000 2026\nbase hex timestamps absolute\ninternal events logged\n" + frames)
+    with EmulatedHandProcess(ends[1], JOINTS) as emulator:
+        for options, heard in (((), 0), (("--bus-kwargs", "first_channel=0"), 10)):
+            words = [sys.executable, "-m", "can.player", *options, "-i", "shadow_bridge", "-c", ends[0], str(log)]
+            done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+            assert (done.returncode == 0) == bool(heard), done.stderr
+            assert heard or "--bus-kwargs first_channel=0" in done.stderr
+            assert emulator.order()["can_frames"] == heard
+
+
 def test_the_logger_records_what_the_motors_say(ends: tuple[str, str], tmp_path: Path) -> None:
     log = tmp_path / "motors.blf"
     announced = [(1 + number % 2, number) for number in range(100)]

@@ -205,6 +205,7 @@ class ShadowBridgeBus(can.BusABC):
         hint = f"Set the message's channel to {names}"
         if number == "0":
             hint += ", or play a file of another program, which numbers the buses 1 and 2, with first_channel=0"
+            hint += " (python-can's tools: --bus-kwargs first_channel=0)"
         raise can.CanOperationError(f"there is no motor bus {channel}. {hint}")
 
 
