@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from drivers.core.contacts import Array, StepSigma
-from tactile_lab.slam.tracking.contacts.contact_map import PlacedGrasp
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -16,6 +17,9 @@ from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, likeliest
 from tactile_lab.slam.tracking.joint.proposals import propose
 from tactile_lab.slam.tracking.joint.settings import JointSettings
+
+_UNTOUCHED_m = 0.015
+"""Farther than this from all contacts the shape is a guess."""
 
 
 @dataclass(frozen=True)
@@ -44,14 +48,44 @@ class Branching:
         """The most likely hypotheses with the grasp placed; if it fits none of them, all with the grasp left out."""
         return self._place(hypotheses) or [self._leave_unplaced(hypothesis) for hypothesis in hypotheses]
 
-    def _leave_unplaced(self, hypothesis: Hypothesis) -> Hypothesis:
-        """All contacts of the grasp left out: the motion model alone says where the object is."""
+    def surprised(self, hypotheses: Sequence[Hypothesis], found: Hypothesis) -> list[Hypothesis]:
+        """The hypotheses continued with another kernel, if contacts on an object left in place do not fit.
+
+        Where nobody touched it before, its shape is a guess that depends on the kernel. As the object has hardly moved,
+        its contacts may be right and the guess wrong: the kernel is estimated again with all of them. The evidence
+        decides; so the continuation without them is given the kernel that suits it best, too. In space only: an outline
+        is touched all around by each grasp, and what does not fit there is rather a push.
+
+        Args:
+            hypotheses: to continue, the most likely first.
+            found: the most likely continuation with the present kernel.
+        """
+        is_left = self.motion_sigma is None and self.noise.after(self.motion) != self.noise
+        if self.contacts.dimension == 2 or not is_left or not self._is_new(found.map):
+            return []
+        settings = hypotheses[0].map.with_grasp(self._expected(hypotheses[0])).with_best_kernel().settings
+        again = [self.scorer.score(replace(each.map, settings=settings)) for each in hypotheses]
+        return [*self._place(again), self.scorer.score(found.map.with_best_kernel())]
+
+    def _is_new(self, found: ContactMap) -> bool:
+        """Whether a contact that the last grasp leaves out lies where nobody touched the object before."""
+        last, before = len(found.placed) - 1, found.grasp_indices < len(found.placed) - 1
+        left_out = found.contacts_of(last).points_m[sorted(found.placed[last].left_out)]
+        if len(left_out) == 0:
+            return False
+        return bool(cdist(left_out, found.contacts.points_m[before]).min(axis=1).max() > _UNTOUCHED_m)
+
+    def _expected(self, hypothesis: Hypothesis) -> PlacedGrasp:
+        """The grasp where the motion model alone says that the object is."""
         last = hypothesis.map.placed[-1]
         row = self.space.compose(self.motion, last.pose)
         noise = self.noise.after(self.motion, self.motion_sigma)
         covariance = last.covariance + np.diag(self.space.sigmas(noise) ** 2)
-        grasp = PlacedGrasp(self.contacts, row, covariance, self.motion, motion_sigma=self.motion_sigma).put_aside()
-        longer = hypothesis.map.with_grasp(grasp)
+        return PlacedGrasp(self.contacts, row, covariance, self.motion, motion_sigma=self.motion_sigma)
+
+    def _leave_unplaced(self, hypothesis: Hypothesis) -> Hypothesis:
+        """All contacts of the grasp left out: the motion model alone says where the object is."""
+        longer = hypothesis.map.with_grasp(self._expected(hypothesis).put_aside())
         return replace(hypothesis, map=longer, left_out=self.scorer.price(longer))
 
     def _place(self, hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:

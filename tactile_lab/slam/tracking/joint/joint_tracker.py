@@ -145,13 +145,19 @@ class JointTracker:
         contacts = contacts if self.mechanisms.has("free space") else contacts.without_free_places()
         given = self._motion, self._motion_sigma, self._noise, self._scorer, self._settings, self._space
         step = Branching(contacts, *given)
-        branches = likeliest(step.branches(self._hypotheses), self._settings.smoothed, self._settings.branch_gap)
-        smoothed = [self._scorer.smooth(branch.map, self._settings.iterations) for branch in branches]
-        smoothed += self.mechanisms.add("pushes", lambda: self._push(min(smoothed, key=cost)))
+        smoothed = self._smooth(step.branches(self._hypotheses))
+        best = min(smoothed, key=cost)
+        smoothed += self.mechanisms.add("surprises", lambda: self._smooth(step.surprised(self._hypotheses, best)))
+        smoothed += self.mechanisms.add("pushes", lambda: self._push(best))
         smoothed += self.mechanisms.add("relocation", lambda: self._relocate_grasp(min(smoothed, key=cost)))
         self._branches = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
         self.effective_count = float(1 / np.sum(weights(self._branches) ** 2))
         return self._branches[0].map.placed[-1].used
+
+    def _smooth(self, branches: list[Hypothesis]) -> list[Hypothesis]:
+        """The most likely branches, smoothed."""
+        promising = likeliest(branches, self._settings.smoothed, self._settings.branch_gap)
+        return [self._scorer.smooth(branch.map, self._settings.iterations) for branch in promising]
 
     def _without_free_space(self, first: ContactMap) -> ContactMap:
         """The map of the first grasp, without free space if that mechanism is off."""

@@ -12,6 +12,7 @@ Mechanism: TypeAlias = Literal[
     "splicing",
     "relocation",
     "pushes",
+    "surprises",
     "valleys",
     "free space",
     "deferred association",
