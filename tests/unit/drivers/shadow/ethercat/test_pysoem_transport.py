@@ -52,6 +52,7 @@ class Soem:
         self.settings = SimpleNamespace(timeouts=SimpleNamespace(ret=USUAL_us))
         self.slaves: tuple[Any, ...] = ()
         self.is_open, self.state, self.requested = False, 0, 0
+        self.awaited: set[int] = set()
 
     @property
     def looked(self) -> int:
@@ -70,19 +71,22 @@ class Soem:
     def config_init(self) -> int:
         self.slaves = self._looks[min(self.looked, len(self._looks) - 1)]
         self.patience_us.append(self.settings.timeouts.ret)
+        self.awaited.clear()
         return len(self.slaves) or -1
 
     def config_map(self) -> None:
         """The process data are those of the look."""
 
     def write_state(self) -> None:
-        """Slaves obey what is requested, and nothing else."""
-        self.requested = self.state
+        """Slaves obey what is requested, and nothing else; to OP they go from SAFEOP alone, which takes its time."""
+        if self.state != OP or self.SAFEOP_STATE in self.awaited:
+            self.requested = self.state
 
     def read_state(self) -> None:
         """The states are those of the look."""
 
     def state_check(self, state: int, timeout_us: int) -> int:
+        self.awaited.add(state)
         return OP if self.requested == OP and all(slave.state == OP for slave in self.slaves) else REFUSED
 
     def send_processdata(self) -> None:
