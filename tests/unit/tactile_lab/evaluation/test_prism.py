@@ -21,8 +21,8 @@ def test_points_that_readers_take_for_one_are_one() -> None:
 
 
 def test_the_fattest_corner_stays_where_its_triangle_holds_the_tip_of_a_notch() -> None:
-    """A square corner, into whose triangle one of two notches reaches."""
-    ring = 0.01 * np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [7.0, 3.0], [0.0, 9.0], [0.5, 5.0]])
+    """Into the triangle of the long corner one of two notches reaches, between the legs on the other side."""
+    ring = 0.01 * np.array([[0, 0], [10, 1], [0, 2], [-6, 2.5], [3, 1], [-6, -0.5], [-3, -0.2]])
     triangles = triangulate(ring)
     areas = [polygon_area(ring[triangle]) for triangle in triangles]
     assert len(triangles) == len(ring) - 2
