@@ -87,7 +87,8 @@ class RigDescription(StrictModel):
         calibration: files to use.
         installation: the installation that the calibrations belong to, so that several rig files of one can share them;
             the rig's own name unless given.
-        devices: serial numbers by device name (hand, base, camera, ft/FF ...); a calibration of another is refused.
+        devices: serial numbers by device name (hand, base, camera, ft/FF ...); a calibration of another is refused,
+            and so is another hand on a cable.
         wires: where the devices are, for kind ``wired``.
         emulated: devices on wires are emulated by this program, in real time, over a simulated plant.
         hand, base, perception, conductor: settings of the parts.

@@ -20,6 +20,7 @@ from drivers.fingertips.kinds import WIRES
 from drivers.fingertips.wiring import make_wire
 from drivers.force.wire_settings import WireSettings
 from drivers.shadow.device.hand_setup import HandSetup
+from drivers.shadow.ethercat.hand_transport import EthercatSettings
 from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.hand_info import HandStatement, load_infos, stated_form
 from drivers.shadow.protocol.palm_images import USUAL_PALM
@@ -38,11 +39,11 @@ def wires_of(rig: Rig) -> Wires:
 
 
 def hand_setup(rig: Rig) -> HandSetup:
-    """The hand of a rig on wires."""
+    """The hand of a rig on wires. Raises ConfigurationError where the rig file names two hands."""
     description, files, wiring = rig.description, rig.files, wires_of(rig).hand
     return HandSetup(
         name=HAND_LINK,
-        ethercat=wiring.ethercat,
+        ethercat=_of_the_named_hand(rig, wiring.ethercat),
         master=wiring.master,
         hand=description.hand.on_wire.model_copy(update={"tactile": tactile_of(rig)}),
         joints=files["joints"].resolve(),
@@ -51,6 +52,17 @@ def hand_setup(rig: Rig) -> HandSetup:
         rates=_whole(files.get("rates")),
         gains=_whole(files.get("gains")),
     )
+
+
+def _of_the_named_hand(rig: Rig, wiring: EthercatSettings) -> EthercatSettings:
+    """The wiring, with the serial number that ``devices`` gives the hand, which the connected one must then have."""
+    named = rig.description.devices.get(HAND_LINK, "")
+    if not named.isdecimal() or wiring.serial == int(named):
+        return wiring
+    if wiring.serial is not None:
+        what = f"devices names hand {named}, but wires.hand.ethercat.serial hand {wiring.serial}"
+        raise ConfigurationError(what, where=rig.source, hint="Name the connected hand in both places")
+    return wiring.model_copy(update={"serial": int(named)})
 
 
 def tactile_of(rig: Rig) -> str:

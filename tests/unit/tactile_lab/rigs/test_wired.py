@@ -48,6 +48,16 @@ def test_the_shipped_rig_is_sound() -> None:
     assert set(build_interpreter(rig).perception.fingertips) == {"FF", "MF", "RF", "LF", "TH"}
 
 
+def test_the_hand_that_devices_names_has_to_be_on_the_cable(tmp_path: Path) -> None:
+    assert hand_setup(load_rig(changed(tmp_path, devices={"hand": "77"}))).wiring().serial == 77
+    assert hand_setup(load_rig(changed(tmp_path, devices={"hand": "the old one"}))).wiring().serial is None
+    wires = yaml.safe_load(wire_rig(tmp_path).read_text())["wires"]
+    wires["hand"]["ethercat"]["serial"] = 634
+    both = load_rig(changed(tmp_path, devices={"hand": "77"}, wires=wires))
+    with pytest.raises(ConfigurationError, match=r"devices names hand 77, but wires.hand.ethercat.serial hand 634"):
+        hand_setup(both)
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
