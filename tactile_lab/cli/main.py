@@ -10,21 +10,29 @@ from __future__ import annotations
 import errno
 import gc
 import os
+import resource
 import sys
 import warnings
 from collections.abc import Callable, Sequence
 
-from drivers.core.errors import TactileLabError, refusal
+from drivers.core.errors import ConfigurationError, TactileLabError, refusal
 from drivers.core.extensions import blamed
 from tactile_lab.cli.interruptions import INTERRUPTED, interruptions_heeded, nothing_begun
 from tactile_lab.cli.streams import open_missing_streams
 
-_WORDS_OF_NO_MEMORY = ("can't start new thread", "ould not allocate memory", "Insufficient memory")
-"""Of Python, MuJoCo and OpenCV, whose errors have no type for it."""
+_WORDS_OF_NO_MEMORY = (
+    "can't start new thread",
+    "ould not allocate memory",
+    "Insufficient memory",
+    "failed to map segment",
+)
+"""Of Python, MuJoCo, OpenCV and the loader of libraries, whose errors have no type for it."""
 _NARROWEST = 20
 """Columns that a terminal has at least."""
 _COLLECTED_AFTER = 10_000
 """New objects until Python looks for garbage: with its own 700, it searches for a fifth of the time of loading."""
+_LEAST_ADDRESSES_bytes = 1_000_000_000
+"""With less, OpenBLAS may try for ever while it is loaded, or a library ends the program without a word."""
 _NO_MEMORY = "the memory is exhausted. Close other programs, or raise the limit (ulimit -v)"
 
 # Sums of several BLAS threads come out in another order, and a replay must give the same bytes on any machine.
@@ -51,6 +59,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     warnings.showwarning = _show_warning
     open_missing_streams()
     try:
+        _check_memory()
         with interruptions_heeded():
             with nothing_begun():
                 from tactile_lab.cli.app import app  # here, so that Ctrl+C while it loads ends without a traceback
@@ -101,6 +110,14 @@ def _run(app: Callable[..., None], arguments: Sequence[str] | None) -> None:
             raise
     check_output()
     sys.exit(0)
+
+
+def _check_memory() -> None:
+    """Raises ConfigurationError when the system allows this program less than its libraries need."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < _LEAST_ADDRESSES_bytes:
+        what = f"only {limit / 1e6:.0f} MB of memory are allowed (ulimit -v), at least 1000 are needed"
+        raise ConfigurationError(what, where="tactile-lab", hint="Raise the limit")
 
 
 def _lacks_memory(error: Exception) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -28,6 +29,7 @@ from tactile_lab.cli.terminal_input import LineInput
 PATIENCE_s = 30.0
 SWALLOWS = """
 import signal
+import subprocess
 try:
     signal.raise_signal(signal.SIGINT)
 except BaseException:
@@ -192,7 +194,9 @@ def test_a_hangup_that_is_ignored_stays_ignored() -> None:
         signal.signal(signal.SIGHUP, before)
 
 
-@pytest.mark.parametrize("error", [MemoryError(), RuntimeError("Could not allocate memory")])
+@pytest.mark.parametrize(
+    "error", [MemoryError(), RuntimeError("Could not allocate memory"), ImportError("x.so: failed to map segment")]
+)
 def test_exhausted_memory_is_told_in_words(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: Exception
 ) -> None:
@@ -204,6 +208,21 @@ def test_exhausted_memory_is_told_in_words(
         main(["rig", "list"])
     assert ended.value.code == 1
     assert "the memory is exhausted" in capsys.readouterr().err
+
+
+def test_a_limit_of_memory_that_libraries_do_not_survive_is_told_before_they_are_loaded() -> None:
+    """With some limits OpenBLAS asks for memory for ever, which nothing but a kill ends."""
+    words = [
+        "-c",
+        "import resource as r, tactile_lab.cli.main as m; r.setrlimit(r.RLIMIT_AS, (240 << 20,) * 2); m.main()",
+    ]
+    ended = subprocess.run(
+        [sys.executable, *words], capture_output=True, text=True, timeout=10 * PATIENCE_s, check=False
+    )
+    assert ended.returncode == 2
+    assert ended.stderr.splitlines() == [
+        "error: tactile-lab: only 252 MB of memory are allowed (ulimit -v), at least 1000 are needed. Raise the limit"
+    ]
 
 
 def test_a_file_that_the_system_refuses_is_told_in_words(
