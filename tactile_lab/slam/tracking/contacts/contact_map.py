@@ -14,6 +14,7 @@ from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 
 _WHATEVER_THE_POSES = ("contacts_world", "grasp_indices", "_free_world")
@@ -76,6 +77,10 @@ class PlacedGrasp:
         """Free places, world frame; without those before a contact that is left out, which may be wrong too."""
         world = self.contacts_world
         return world.free_m[~np.isin(world.free_of, sorted(self.left_out))]
+
+    def was_left(self, noise: MotionNoise) -> bool:
+        """Whether the hand left the object in place before, and it is therefore expected to move less."""
+        return self.motion_sigma is None and noise.after(self.motion) != noise
 
     def put_aside(self) -> PlacedGrasp:
         """The same grasp with none of its contacts in the shape."""

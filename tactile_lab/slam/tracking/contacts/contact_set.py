@@ -31,6 +31,7 @@ class ContactSet:
         free_m: places known to be outside of the object when these contacts were made, shape (q, d), same frame.
         free_of: the contact whose finger was at each of them, -1 for a finger without contact, shape (q,).
         shared: errors that contacts of one finger share.
+        by_touch: made by fingers that touched without closing, so that nothing pushed the object.
     """
 
     points_m: Array
@@ -40,6 +41,7 @@ class ContactSet:
     free_m: Array = field(default_factory=lambda: np.empty((0, 0)))
     free_of: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     shared: SharedErrors = NO_SHARED_ERRORS
+    by_touch: bool = False
 
     def __len__(self) -> int:
         return len(self.points_m)
@@ -76,7 +78,8 @@ class ContactSet:
         normal_sigma = np.maximum(normal_sigma, LEAST_SIGMA_rad)
         seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
         free, free_of = _free_places(grasp, seen, counted, heights)
-        return replace(seen, free_m=free, free_of=free_of, shared=SharedErrors.of(counted, normals))
+        by_touch = bool(grasp.contacts) and all(contact.probed for contact in grasp.contacts)
+        return replace(seen, free_m=free, free_of=free_of, shared=SharedErrors.of(counted, normals), by_touch=by_touch)
 
     @classmethod
     def concatenate(cls, parts: Sequence[ContactSet]) -> Self:

@@ -60,7 +60,7 @@ class Branching:
             hypotheses: to continue, the most likely first.
             found: the most likely continuation with the present kernel.
         """
-        is_left = self.motion_sigma is None and self.noise.after(self.motion) != self.noise
+        is_left = found.map.placed[-1].was_left(self.noise)
         if self.contacts.dimension == 2 or not is_left or not self._is_new(found.map):
             return []
         settings = hypotheses[0].map.with_grasp(self._expected(hypotheses[0])).with_best_kernel().settings
@@ -68,8 +68,14 @@ class Branching:
         return [*self._place(again), self.scorer.score(found.map.with_best_kernel())]
 
     def _is_new(self, found: ContactMap) -> bool:
-        """Whether a contact that the last grasp leaves out lies where nobody touched the object before."""
+        """Whether a contact that the last grasp leaves out lies where nobody touched the object before.
+
+        Contacts of fingers that only touched are not left out: whether one of them does not fit.
+        """
         last, before = len(found.placed) - 1, found.grasp_indices < len(found.placed) - 1
+        if self.contacts.by_touch:
+            costs = found.fit().leave_one_out_costs(np.flatnonzero(~before))
+            return bool(costs.max(initial=-np.inf) > self.settings.proposals.unexplained_cost)
         left_out = found.contacts_of(last).points_m[sorted(found.placed[last].left_out)]
         if len(left_out) == 0:
             return False

@@ -63,7 +63,7 @@ def propose_pushes(
     """
     last = len(hypothesis.map.placed) - 1
     grasp = hypothesis.map.placed[last]
-    if not _is_doubtful(grasp) or not _was_left(grasp, noise):
+    if not _is_doubtful(grasp) or not grasp.was_left(noise):
         return []
     near = _near(hypothesis, last, noise, settings)
     return _place_at(hypothesis, last, near, scorer, _most(grasp.contacts_world), Moved.PUSHED)
@@ -94,7 +94,7 @@ def associate_deferred(
         near, contacts = _near(hypothesis, index, noise.accumulate(2), settings), grasp.contacts_world
         fitting = max(_LEAST_FITTING, len(grasp.kept) + 1)
         candidates = _place_at(hypothesis, index, near, scorer, fitting, Moved.AS_MEANT)
-        if pushes and _was_left(grasp, noise):
+        if pushes and grasp.was_left(noise):
             candidates += _place_at(hypothesis, index, near, scorer, fitting, Moved.PUSHED)
         if relocate is not None and not grasp.used:
             anywhere = relocate(hypothesis.map.without_grasp(index), contacts)[:_TRIED]
@@ -105,11 +105,6 @@ def associate_deferred(
 
 def _is_doubtful(grasp: PlacedGrasp) -> bool:
     return len(grasp.left_out) >= _DOUBTFUL and len(grasp.contacts_world) >= _LEAST_CONTACTS
-
-
-def _was_left(grasp: PlacedGrasp, noise: MotionNoise) -> bool:
-    """Whether the hand left the object in place before a grasp, and it is therefore expected to move less."""
-    return noise.after(grasp.motion) != noise
 
 
 def _near(hypothesis: Hypothesis, index: int, noise: MotionNoise, settings: ProposalSettings) -> Array:

@@ -98,6 +98,9 @@ class HypothesisScorer:
     def clean(self, contact_map: ContactMap, grasp: int | None = None) -> tuple[ContactMap, float]:
         """Leave out contacts, the worst first, while they cost more than unexplained contacts.
 
+        Contacts of fingers that only touched an object left in place stay: where it was is known, and a field may be
+        wrong beside an edge however sure it is.
+
         Args:
             contact_map: with its present poses.
             grasp: whose contacts may be left out; None for all.
@@ -106,11 +109,18 @@ class HypothesisScorer:
             The map, and the negative log posterior of its poses.
         """
         while True:
-            asked = _asked_contacts(contact_map, grasp)
+            asked = self._asked_contacts(contact_map, grasp)
             costs = contact_map.fit().leave_one_out_costs(asked)
             if len(asked) == 0 or costs.max() <= self._unexplained_cost or len(contact_map.grasp_indices) == 1:
                 return contact_map, self._misfit(contact_map)
             contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
+
+    def _asked_contacts(self, contact_map: ContactMap, grasp: int | None) -> NDArray[np.intp]:
+        """Indices of the contacts that may be left out."""
+        indices = contact_map.grasp_indices
+        sure = [one.contacts_world.by_touch and one.was_left(self._noise) for one in contact_map.placed]
+        asked = ~np.array(sure)[indices]
+        return np.flatnonzero(asked if grasp is None else asked & (indices == grasp))
 
     def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
         """The most likely ones of those with equal trajectories.
@@ -217,8 +227,3 @@ def _near(gaps: Array, space: PoseVectors) -> bool:
     """Whether poses differ by less than the resolution."""
     limits = np.where(np.arange(space.size) < space.translations, _SAME_TRANSLATION_m, _SAME_ROTATION_rad)
     return bool((np.abs(gaps) <= limits).all())
-
-
-def _asked_contacts(contact_map: ContactMap, grasp: int | None) -> NDArray[np.intp]:
-    indices = contact_map.grasp_indices
-    return np.arange(len(indices)) if grasp is None else np.flatnonzero(indices == grasp)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -29,6 +30,14 @@ AROUND: list[Touch] = [
 MIDDLE: list[Touch] = [((4, -5, 36), SLOPE), ((-6, -3, 40), SLOPE), ((2, -7, 37), SLOPE)]
 TALL_END: list[Touch] = [((-39, 19, 55), SLOPE), ((-36, -22, 54), SLOPE)]
 """A wedge of 100 x 60 mm, 60 mm high at one end and 15 mm at the other."""
+
+
+WALLS: list[Touch] = [
+    *(((x, 30, z), (0, 1, 0)) for x, z in ((-40, 44), (-25, 38), (-10, 30), (5, 24), (20, 15))),
+    *(((x, -30, z), (0, -1, 0)) for x, z in ((-40, 44), (-25, 38), (-10, 30), (5, 24), (20, 15))),
+    *(((-50, y, 48), (-1, 0, 0)) for y in (-20, 0, 20)),
+]
+NEAR_THE_EDGE: list[Touch] = [((-30, 22, 51), SLOPE), ((-26, 25, 49.2), SLOPE)]
 
 
 def touched(places: list[Touch], index: int, rng: np.random.Generator) -> Grasp:
@@ -64,3 +73,17 @@ def test_a_touch_that_no_kernel_explains_is_left_out_all_the_same() -> None:
     """A contact deep inside of the wedge, below others on its slope and far from all of them."""
     wrong: Touch = ((0, 0, 8), SLOPE)
     assert then_touched([*MIDDLE, wrong], 1, LEFT).contacts_used == len(MIDDLE)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_fingers_that_only_touched_are_believed_beside_an_edge_too(seed: int) -> None:
+    """The slope 11 mm from contacts on a wall: the field rounds the edge and is sure of it."""
+    used = []
+    for probed in (False, True):
+        rng = np.random.default_rng(seed)
+        slam = TactileSlam(SlamSettings.model_validate({"method": "joint", "dimension": 3, "motion": LEFT}), seed)
+        slam.step(touched(WALLS, 0, rng))
+        tap = touched(NEAR_THE_EDGE, 1, rng)
+        step = slam.step(replace(tap, contacts=tuple(replace(each, probed=probed) for each in tap.contacts)))
+        used.append(step.contacts_used)
+    assert used == [0, len(NEAR_THE_EDGE)]
