@@ -30,20 +30,37 @@ def foreign_folder(tmp_path: Path) -> Path:
     return folder
 
 
+def run_in(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    command = [str(Path(sys.executable).with_name("tactile-lab")), *words]
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    return subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+
+
+def test_workers_of_an_experiment_execute_nothing_of_the_folder(foreign_folder: Path) -> None:
+    done = run_in(
+        foreign_folder,
+        "experiment",
+        "figure-2.5",
+        "--seeds",
+        "0",
+        "--only",
+        "contacts=10",
+        "--jobs",
+        "2",
+        "--out",
+        "..",
+    )
+    assert done.returncode == 0, done.stderr
+    assert not (foreign_folder.parent / "executed").exists()
+
+
 @pytest.mark.long
 @pytest.mark.usefixtures("real_time_alone")
 @pytest.mark.parametrize("rig", sorted(shipped_rigs()))
 def test_every_rig_runs_and_nothing_of_the_folder_is_executed(foreign_folder: Path, rig: str) -> None:
-    command = [str(Path(sys.executable).with_name("tactile-lab")), "run", "--rig", rig, "--grasps", "1", "--seed", "1"]
-    done = subprocess.run(
-        command,
-        cwd=foreign_folder,
-        env={key: value for key, value in os.environ.items() if key != "PYTHONPATH"},
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    done = run_in(foreign_folder, "run", "--rig", rig, "--grasps", "1", "--seed", "1")
     assert done.returncode in (0, 3), done.stderr  # 3: on a busy machine messages come late
     assert "Traceback" not in done.stderr
     assert not (foreign_folder.parent / "executed").exists()

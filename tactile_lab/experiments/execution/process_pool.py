@@ -34,8 +34,9 @@ def run_in_processes(cells: Sequence[Cell], work: Work, jobs: int) -> Iterator[R
         SessionError: a process died.
     """
     context = multiprocessing.get_context("spawn")
-    watch = _WorkerWatch(context.SimpleQueue(), cells)
-    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker, initargs=(watch.begun,))
+    with _inherited():  # the first queue already starts a process, which keeps account of semaphores
+        watch = _WorkerWatch(context.SimpleQueue(), cells)
+        pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_prepare_worker, initargs=(watch.begun,))
     try:
         with _inherited():
             waiting = {pool.submit(_execute_in_worker, cell, work) for cell in cells}
