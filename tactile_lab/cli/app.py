@@ -11,9 +11,11 @@ from drivers.core.extensions import load_extension, load_named_extensions
 from tactile_lab.cli import bench, experiment, markers, plugins, rig
 from tactile_lab.cli.calibrate import calibrate
 from tactile_lab.cli.commands import COMMANDS, Commands
+from tactile_lab.cli.completion import answer_the_first_tab
 from tactile_lab.cli.running import ros2_bridge, run, sweep
 from tactile_lab.cli.sessions import evaluate, model, reconstruct, report, session, view
 
+answer_the_first_tab()
 app = typer.Typer(
     cls=Commands,
     help="Tactile SLAM in the laboratory: the shape and pose of an unknown object from a few fingertip contacts.",

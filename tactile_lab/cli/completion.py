@@ -11,8 +11,21 @@ from importlib import resources
 from pathlib import Path
 
 import typer
+from typer import _completion_shared
 
 _MANIFEST = "session.yaml"
+_AT_FIRST_TAB = """
+if [[ $zsh_eval_context[-1] == loadautofunc ]]; then
+  %(complete_func)s "$@"
+fi
+"""
+
+
+def answer_the_first_tab() -> None:
+    """Let zsh complete when it loads the installed script: Typer's only defines how, and the first Tab is lost."""
+    scripts = _completion_shared._completion_scripts
+    if not scripts["zsh"].endswith(_AT_FIRST_TAB):
+        scripts["zsh"] += _AT_FIRST_TAB
 
 
 def complete_rig(incomplete: str) -> list[str]:

@@ -65,6 +65,9 @@ def test_colours_are_for_terminals_and_can_be_refused(tactile_lab):
     assert "\x1b" not in answer.err
 
 
+_SCRIPT, _ZSH = "_TACTILE_LAB_COMPLETE=source", "PS1='> '; autoload -Uz compinit; compinit -u -d $HOME/dump"
+
+
 @pytest.fixture
 def program(tmp_path: Path) -> Path:
     """A folder with the program under its name."""
@@ -78,8 +81,9 @@ def program(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     ("shell", "words", "setup"),
     [
-        ("bash", ("--norc", "--noprofile", "-i"), ""),
-        ("zsh", ("-f", "-i"), "PS1='> '; autoload -Uz compinit; compinit -u -d $HOME/dump; "),
+        ("bash", ("--norc", "--noprofile", "-i"), f'eval "$({_SCRIPT}_bash tactile-lab)"'),
+        ("zsh", ("-f", "-i"), f'{_ZSH}; eval "$({_SCRIPT}_zsh tactile-lab)"'),
+        ("zsh", ("-f", "-i"), f"tactile-lab --show-completion > $HOME/_tactile-lab; fpath+=$HOME; {_ZSH}"),
     ],
 )
 def test_shells_complete_commands_rigs_and_sessions(program, tmp_path, shell, words, setup):
@@ -97,7 +101,7 @@ def test_shells_complete_commands_rigs_and_sessions(program, tmp_path, shell, wo
         encoding="utf-8",
         timeout=PATIENCE_s * 6,
     )
-    child.sendline(f"""{setup}eval "$(_TACTILE_LAB_COMPLETE=source_{shell} tactile-lab)"; echo rea''dy""")
+    child.sendline(f"{setup}; echo rea''dy")
     child.expect_exact("ready\r\n")
     for typed, rest in (
         ("tactile-lab rig check sim-b", "iotac"),
