@@ -124,7 +124,8 @@ class RunningSession(Session):
         )
         if not self._traffic.path.is_file():
             what = "was removed or renamed while it was recorded"
-            hint = f"If it was renamed, recover it by its new name: tactile-lab session recover {self.folder.name}"
+            renamed = self.folder.with_name("NEW-NAME")
+            hint = f"If it was renamed, recover it by its new name: tactile-lab session recover {renamed}"
             raise SessionError(what, where=str(self.folder), hint=hint)
         write_manifest(self.folder, self.manifest)
 
