@@ -89,9 +89,10 @@ class Positioner:
     def _ask(self) -> None:
         for _ in range(self._settings.connect_tries):
             self._transport.send(self._codec.encode_command(PositionerCommand(QUESTION, None)))
-            self._last = self._take(self._transport.receive())
+            self._heard = None
+            self._last = self._take(self._transport.receive()[-1:])  # before it may lie answers to an earlier session
             if self._last is not None:
-                self._sent = self._target = self._last.q
+                self._heard, self._sent, self._target = QUESTION, self._last.q, self._last.q
                 return
             self._clock.sleep_until_ns(self._clock.now_ns() + round(self._settings.cycle_s * NANOSECONDS))
         raise DeviceError(
@@ -135,11 +136,10 @@ class Positioner:
             The new sample, or after a lost cycle the last one, marked as not fresh.
 
         Raises:
-            DeviceError: not connected; or the positioner had stopped itself before this cycle.
+            DeviceError: not connected; or the positioner has stopped itself, in this cycle or before.
         """
         if not self._connected or self._last is None:
             raise DeviceError("not connected", where=self._transport.name, hint="Connect the positioner first")
-        fault = self._fault
         self._send_step()
         sample = self._take(self._transport.receive())
         if sample is None:
@@ -148,8 +148,7 @@ class Positioner:
         else:
             self._last, self._counters.lost_in_a_row = sample, 0
             self._check_following(sample)
-        if fault is not None:
-            raise DeviceError(fault[0], where=self._transport.name, hint=fault[1])
+        self._raise_fault()
         return self._last
 
     def receive(self, datagram: Datagram) -> PositionerSample | None:
@@ -214,12 +213,17 @@ class Positioner:
     def _check_following(self, sample: PositionerSample) -> None:
         behind = np.abs(self._sent - sample.q) / self._following
         if behind.max() > 1.0 and self._fault is None:
+            self._sent = sample.q
             self._hold(f"stopped: {AXES[behind.argmax()]} does not follow, something may block it")
-            self._sent = self._target = sample.q
 
     def _hold(self, what: str, hint: str = "Find the cause, then resume") -> None:
-        self._target = self._sent
-        self._fault = (what, hint)
+        self._target, self._fault = self._sent, (what, hint)
+        self._send_step()  # to stay, before anybody is told
+
+    def _raise_fault(self) -> None:
+        """In the cycle of the fault: what else a session drives does not wait for the next."""
+        if self._fault is not None:
+            raise DeviceError(self._fault[0], where=self._transport.name, hint=self._fault[1])
 
     # --- state for people --------------------------------------------------------------------------------------
 

@@ -75,7 +75,7 @@ class UrPositioner(Positioner):
         """One cycle, as :meth:`Positioner.exchange`.
 
         Raises:
-            DeviceError: also when the arm, its program or a person at its pendant had stopped it before this cycle.
+            DeviceError: also when the arm, its program or a person at its pendant has stopped it.
         """
         if self._order is ArmOrder.FREEDRIVE and self._last is not None:
             self._sent = self._target = self._last.q
@@ -86,6 +86,7 @@ class UrPositioner(Positioner):
         if cause is not None and self._order is not ArmOrder.RESUME and self._fault is None:
             self._hold_still()
             self._hold(cause.what, cause.remedy)
+            self._raise_fault()
         return sample
 
     def receive(self, datagram: Datagram) -> PositionerSample | None:

@@ -282,9 +282,9 @@ def test_a_status_that_takes_up_to_a_cycle_is_not_lost_and_one_that_never_comes_
     assert rig.device.counters.lost == 2
 
 
-def test_ten_lost_cycles_stop_the_positioner_and_the_next_exchange_says_so(rig: Rig) -> None:
+def test_ten_lost_cycles_stop_the_positioner_and_the_tenth_says_so(rig: Rig) -> None:
     rig.base.mute = True
-    rig.run(11)  # the first answer may be on its way
+    rig.run(10)  # the first answer may be on its way
     with pytest.raises(DeviceError, match="base: stopped after 10 cycles in a row without a status"):
         rig.run(1)
     rig.base.mute = False

@@ -198,7 +198,6 @@ def test_the_arm_s_own_stop_ends_the_motion_in_its_words_until_it_is_resumed() -
     session = Session()
     session.cycles(3)
     session.far.state = replace(READY, safety_bits=0b100, flags=ArmFlags.HEARD)
-    session.cycles(1)
     with pytest.raises(DeviceError, match=r"base: protective stop .* release it on the pendant"):
         session.cycles(1)
     assert any("protective stop" in words for words in session.device.health())
