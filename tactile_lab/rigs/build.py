@@ -74,7 +74,7 @@ def _check_fingers(rig: Rig) -> None:
 def _check_driven(rig: Rig) -> None:
     """Raises ConfigurationError where gains never drive a joint: a straight finger meets everything first."""
     gains = rig.description.hand.gains if rig.description.wires is None else hand_setup(rig).settings().gains
-    if idle := [name for name in hand_form(rig).driven if gains.of(name).max_pwm == 0.0]:
+    if idle := [name for name in hand_form(rig).driven if not gains.of(name).is_driven]:
         what = f"never drives {', '.join(idle)}, whose largest demand is 0: a grasp needs every joint"
         where = str(rig.files["gains"]) if "gains" in rig.files else f"{rig.source}: hand.gains"
         raise ConfigurationError(what, where=where, hint="A rig of kind hand can check and drive the others")

@@ -71,8 +71,7 @@ STRIKES_AT = "close"
 
 LONGEST_s = {"hand": 3.0, "base": 0.5, "ft/MF": 0.5, "camera": 1.5}
 """Longest time from the fault to the session's end, if it ends: 2 s in which a hand may come back, ten lost cycles of
-the positioner, 0.2 s without a fingertip, a second for a picture, plus the cycles that stop the hand. A finger whose
-angle seems constant is stopped by its force limit.
+the positioner, 0.2 s without a fingertip, a second for a picture, plus the cycles that stop the hand.
 """
 
 UNTIL_IT_MOVES_s = {("base", "stuck value"): 5.0}

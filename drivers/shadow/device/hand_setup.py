@@ -114,7 +114,7 @@ class HandSetup(StrictModel):
         gains, turns = self.settings().gains, self.calibration().turns
         for name in self.form().driven:
             seen = any(turns[JOINT_INDEX[joint]] for joint in angles_of_driven(name))
-            if not seen and gains.of(name).max_pwm > 0.0:
+            if not seen and gains.of(name).is_driven:
                 what = (
                     f"has the same angle of {name} at every count, but its gains drive it: it would be pushed blindly"
                 )

@@ -48,7 +48,7 @@ class PositionControl:
         self._deadband_rad = np.array([each.deadband_rad for each in table])
         self._minus_deadband_rad = -self._deadband_rad
         self._limit = np.array([each.max_pwm for each in table])
-        self.drivable: tuple[str, ...] = tuple(name for name in motors.driven if gains.of(name).max_pwm > 0.0)
+        self.drivable: tuple[str, ...] = tuple(name for name in motors.driven if gains.of(name).is_driven)
         self._damping = np.array([each.damping for each in table])
         self._integral_gain = np.array([each.integral for each in table])
         self._integral_max = np.array([each.integral_max for each in table])

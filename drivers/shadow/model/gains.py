@@ -40,6 +40,11 @@ class JointGains(StrictModel):
     integral: float = Field(default=0.0, ge=0.0)
     integral_max: float = Field(default=0.0, ge=0.0)
 
+    @property
+    def is_driven(self) -> bool:
+        """Whether the joint is to be driven."""
+        return self.max_pwm > 0.0
+
 
 class GainTable(StrictModel):
     """Gains by class of joint, with exceptions by name.

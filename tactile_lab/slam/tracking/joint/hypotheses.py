@@ -108,19 +108,19 @@ class HypothesisScorer:
         Returns:
             The map, and the negative log posterior of its poses.
         """
+        asked_grasps = self._asked_grasps(contact_map, grasp)
         while True:
-            asked = self._asked_contacts(contact_map, grasp)
+            asked = np.flatnonzero(asked_grasps[contact_map.grasp_indices])
             costs = contact_map.fit().leave_one_out_costs(asked)
             if len(asked) == 0 or costs.max() <= self._unexplained_cost or len(contact_map.grasp_indices) == 1:
                 return contact_map, self._misfit(contact_map)
             contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
 
-    def _asked_contacts(self, contact_map: ContactMap, grasp: int | None) -> NDArray[np.intp]:
-        """Indices of the contacts that may be left out."""
-        indices = contact_map.grasp_indices
+    def _asked_grasps(self, contact_map: ContactMap, grasp: int | None) -> NDArray[np.bool_]:
+        """Which grasps' contacts may be left out, shape (g,)."""
         sure = [one.contacts_world.by_touch and one.was_left(self._noise) for one in contact_map.placed]
-        asked = ~np.array(sure)[indices]
-        return np.flatnonzero(asked if grasp is None else asked & (indices == grasp))
+        named = np.arange(len(sure)) == grasp if grasp is not None else True
+        return ~np.array(sure, dtype=bool) & named
 
     def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
         """The most likely ones of those with equal trajectories.
