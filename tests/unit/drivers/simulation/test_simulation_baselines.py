@@ -19,7 +19,7 @@ from drivers.simulation.model import build_model
 from drivers.simulation.objects import CATALOGUE, object_model
 from drivers.simulation.settings import BiotacSettings, HandBoard, JointSensorSettings, ObjectStart, SimulationSettings
 from tests.support.baseline import assert_baseline
-from tests.support.plain_values import plain
+from tests.support.plain_values import condensed, plain
 from tests.support.simulated_program import Program, records
 
 OF_MODEL = (
@@ -40,16 +40,6 @@ SETTINGS = SimulationSettings(
     start=ObjectStart(x_m=0.02, y_m=-0.01, yaw_rad=0.4),
     joint_sensors=JointSensorSettings(noise_rad=0.0),
 )
-
-
-def condensed(values: Any) -> list[float]:
-    """How many numbers, their sum, and two sums with weights that tell which one changed places or sign."""
-    flat = np.asarray(values, float).ravel()
-    places = np.arange(len(flat))
-    return [
-        float(len(flat)),
-        *(float(np.sum(weights * flat)) for weights in (1.0, np.cos(places), np.sin(1.7 * places))),
-    ]
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
