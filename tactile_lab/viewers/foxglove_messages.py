@@ -103,8 +103,11 @@ Made = Iterator[tuple[str, Any, str | None]]
 
 def _frames(item: Frames) -> Made:
     transforms = [frame_transform(item.stamp_ns, placement) for placement in item.placements]
-    names = ",".join(placement.child for placement in item.placements)
-    yield ("/tf_static" if item.lasting else "/tf"), fm.FrameTransforms(transforms=transforms), names
+    if item.lasting:
+        yield "/tf_static", fm.FrameTransforms(transforms=transforms), ""
+    else:
+        names = ",".join(placement.child for placement in item.placements)
+        yield "/tf", fm.FrameTransforms(transforms=transforms), names
 
 
 def _joints(item: Joints) -> Made:
@@ -159,9 +162,9 @@ def _surface(item: Surface) -> Made:
     if not len(item.vertices_m):
         yield "/object/surface", fm.SceneUpdate(deletions=[deletion(item.stamp_ns, "surface")]), ""
         return
-    mesh = fm.TriangleListPrimitive(
+    mesh = fm.TriangleListPrimitive(  # opaque: viewers do not sort triangles, and the far side would show in patches
         points=[fm.Point3(x=x, y=y, z=z) for x, y, z in item.vertices_m.tolist()],
-        colors=[fm.Color(r=r, g=g, b=b, a=0.85) for r, g, b in (item.colours / 255.0).tolist()],
+        colors=[fm.Color(r=r, g=g, b=b, a=1.0) for r, g, b in (item.colours / 255.0).tolist()],
         indices=item.triangles.ravel().tolist(),
     )
     entity = lasting_entity(item.stamp_ns, OBJECT, "surface", triangles=[mesh], facts=facts, locked=True)
@@ -200,7 +203,7 @@ def _candidates(item: Candidates) -> Made:
         if one.chosen:
             above = Pose3(Rot3(), place + np.array([0.0, 0.0, 0.05]))
             label = fm.TextPrimitive(
-                pose=pose_message(above), billboard=True, font_size=0.008, color=colour_message(_CHOSEN), text=item.text
+                pose=pose_message(above), billboard=True, font_size=0.008, color=colour_message(_CHOSEN), text="next"
             )
             texts.append(label)
     scores = [one.score for one in item.candidates]

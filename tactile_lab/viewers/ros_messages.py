@@ -149,7 +149,7 @@ class RosMessages:
         action = _ADD if len(corners) else _DELETE
         marker = self._marker(item.stamp_ns, OBJECT, "surface", 0, _TRIANGLES, action=action)
         marker.points = [self._types["geometry_msgs/msg/Point"](*place) for place in item.vertices_m[corners].tolist()]
-        marker.colors = [self._types["std_msgs/msg/ColorRGBA"](*rgb, 0.85) for rgb in rows[corners].tolist()]
+        marker.colors = [self._types["std_msgs/msg/ColorRGBA"](*rgb, 1.0) for rgb in rows[corners].tolist()]
         marker.frame_locked = True
         yield "/object/surface", MARKER, item.stamp_ns, marker
         columns = {**dict(zip("xyz", item.vertices_m.T, strict=True)), "sigma_m": item.sigma_m}

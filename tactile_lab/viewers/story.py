@@ -55,13 +55,14 @@ class Story:
     def __init__(self, robot: Robot, camera: CameraPose | None = None) -> None:
         self.robot = robot
         self._camera = camera
+        self._fixed: dict[str, Placement] = {}
         self._objects: dict[str, Pose3] = {}
         self._estimate: Pose3 | None = None
         self._grasps: list[int] = []
 
     def begin(self, stamp_ns: int) -> Iterator[Item]:
         """What never changes."""
-        yield Frames(stamp_ns, tuple(self.robot.fixed()), lasting=True)
+        yield self._lasting(stamp_ns, *self.robot.fixed())
 
     def state(self, stamp_ns: int, joints_rad: Array, base_q: Array) -> Iterator[Item]:
         """Hand and positioner moved: joints (24,) in radians, coordinates (6,) in metres and radians."""
@@ -78,7 +79,12 @@ class Story:
         """A camera picture. The first that shows the world marker determines the camera's pose."""
         yield Picture(stamp_ns, encoded)
         if self._camera is not None and (found := self._camera.first_sight(encoded)) is not None:
-            yield Frames(stamp_ns, (Placement(WORLD, CAMERA, found),), lasting=True)
+            yield self._lasting(stamp_ns, Placement(WORLD, CAMERA, found))
+
+    def _lasting(self, stamp_ns: int, *placements: Placement) -> Frames:
+        """All that never move so far: who comes late, or jumps in a recording, is given the newest message alone."""
+        self._fixed |= {one.child: one for one in placements}
+        return Frames(stamp_ns, tuple(self._fixed.values()), lasting=True)
 
     def message(self, topic: str, data: bytes, stamp_ns: int) -> Iterator[Item]:
         """A recorded message; topics that viewers do not need give nothing. Raises ValueError for invalid content."""

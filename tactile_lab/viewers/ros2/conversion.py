@@ -10,8 +10,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.viewers.camera_pose import camera_of_rig
-from tactile_lab.viewers.items import Frames, Item
-from tactile_lab.viewers.robot import Placement
+from tactile_lab.viewers.items import Item
 from tactile_lab.viewers.robot_of_rig import robot_of_rig
 from tactile_lab.viewers.ros_bag import LASTING
 from tactile_lab.viewers.ros_messages import RosMessages
@@ -51,7 +50,6 @@ class Conversion:
         """What follows is another session's."""
         self._story = Story(self._robot, self._camera)
         self._ahead_ns: int | None = None
-        self._fixed: dict[str, Placement] = {}
 
     def of(self, topic: str, data: bytes, stamp_ns: int) -> Iterator[Serialized]:
         """The messages of ROS 2; before the first of a session what never changes. Raises ValueError."""
@@ -65,9 +63,6 @@ class Conversion:
 
     def _converted(self, item: Item) -> Iterator[Serialized]:
         item = replace(item, stamp_ns=item.stamp_ns + (self._ahead_ns or 0))
-        if isinstance(item, Frames) and item.lasting:  # the newest message holds all, for those who come later
-            self._fixed |= {one.child: one for one in item.placements}
-            item = replace(item, placements=tuple(self._fixed.values()))
         yield from self._serialized(self._make.live(item))
 
     def _serialized(self, made: Iterator[tuple[str, str, int, Any]]) -> Iterator[Serialized]:
