@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -122,9 +123,11 @@ def test_a_report_tells_of_frames_and_markers_and_the_end_of_the_orders_ends_it(
     assert len(records.put_down) == 2
 
 
-def test_a_folder_is_played_at_its_rate_and_again_if_it_had_pictures(orders: Any, pictures: list[np.ndarray]) -> None:
+def test_a_folder_is_played_at_its_rate_and_again_if_it_had_pictures(
+    orders: Any, pictures: list[np.ndarray], tmp_path: Path
+) -> None:
     source, records = Source(pictures[1:2]), Records()
-    made, clock = worker(source, records, source="folder:somewhere", rate_hz=20.0, repeat=True)
+    made, clock = worker(source, records, source=str(tmp_path), rate_hz=20.0, repeat=True)
     seen = []
     read = source.read
 
@@ -138,6 +141,6 @@ def test_a_folder_is_played_at_its_rate_and_again_if_it_had_pictures(orders: Any
     made.run()
     assert seen == [0, 50, 50, 100, 100, 150, 150]
     assert source.opened == 3
-    empty, _ = worker(Source([]), records, source="folder:somewhere", repeat=True)
+    empty, _ = worker(Source([]), records, source=str(tmp_path), repeat=True)
     with pytest.raises(DeviceError, match="has ended"):
         empty.run()
