@@ -61,14 +61,14 @@ def test_a_hand_is_opened_served_and_closed(palm: PalmName, eeprom: EepromKind, 
         "hand": plain(transport.hand),
         "counts": plain(transport.counts),
         "health": list(transport.health()),
-        "states": wire.states,
+        "states": [int(state) for state in wire.states],
         "slaves": [plain(slave.counts) for slave in wire.hand.ring.slaves],
         "sent": condensed(list(overheard.sent)),
     }
     overheard.told.clear()
     transport.close()
     found["closed"] = overheard.told
-    found["states then"] = wire.states
+    found["states then"] = [int(state) for state in wire.states]
     assert_baseline(f"ring/{palm}", found)
 
 
