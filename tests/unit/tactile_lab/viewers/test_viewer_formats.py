@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -79,6 +80,15 @@ def test_the_layout_shows_topics_that_there_are(decoded):
     shown |= {one["value"].partition(".")[0] for one in panels["Plot!forces"]["paths"] if "/FF/" in one["value"]}
     assert shown <= set(decoded)
     assert json.dumps(layout["layout"]).count("!") == len(panels)  # every panel has its place
+
+
+def test_the_page_of_the_open_viewer_finds_its_layout():
+    examples = REPOSITORY / "docs" / "examples"
+    page = (examples / "open-viewer.html").read_text()
+    (fetched,) = re.findall(r'fetch\("([^"]+)"\)', page)
+    panels = json.loads((examples / fetched).read_text())["configById"]
+    (panel,) = re.findall(r'layout\.configById\["([^"]+)"\]', page)
+    assert panels[panel]["imageMode"]["imageTopic"] == "/camera/image"
 
 
 def test_frames_form_one_tree_below_the_world(decoded):
