@@ -57,12 +57,16 @@ class Choice:
     def tests(self, mutation: Mutation) -> list[str]:
         """Tests or whole files, the nearest first."""
         files = self.nearest.tests(mutation.path)
+        if self.nearest.at_import(mutation.path, mutation.line):
+            return [*self.nearest.walkers, *self._users(mutation.path, files)]
         lines = range(mutation.line, mutation.line + mutation.before.count("\n"))
         found = [self.covering.tests(mutation.path, line, files) for line in lines] if self.covering else []
         return next(filter(None, found), []) or self._users(mutation.path, files)
 
     def _users(self, path: str, files: list[str]) -> list[str]:
         """For lines run at an import or in another process: tests that run others of the file, then the nearest files.
+
+        Coverage tells of a line run at an import only which test happened to import its module first.
 
         A process is run by whole sessions and wires: two of those are among the nearest.
         """

@@ -6,12 +6,17 @@ import ast
 import re
 from collections import defaultdict
 from pathlib import Path
+from typing import TypeGuard
 
 SOURCES = ("tactile_lab", "sessions", "calibration", "drivers", "tests")
 
 
 class Nearest:
-    """The import graph of a tree, and the tests of each module by their distance in it."""
+    """The import graph of a tree, and the tests of each module by their distance in it.
+
+    Attributes:
+        walkers: tests that import all modules of a package, and look at what these define.
+    """
 
     def __init__(self, root: Path) -> None:
         self.files = {
@@ -21,6 +26,7 @@ class Nearest:
         }
         self.modules = {_module(path): path for path in self.files}
         self.imports = {path: self._imports(path) for path in self.files}
+        self.walkers = [path for path in self.files if Path(path).name.startswith("test_") and self._walks(path)]
         self.importers: defaultdict[str, set[str]] = defaultdict(set)
         for path, imported in self.imports.items():
             for other in imported:
@@ -33,6 +39,15 @@ class Nearest:
         return sorted(
             tests, key=lambda test: (_slow(test), distances[test], not _mirrors(test, path), len(self.imports[test]))
         )
+
+    def at_import(self, path: str, line: int) -> bool:
+        """Whether a line runs while its module is imported: it is in no body of a function."""
+        functions = [node for node in ast.walk(ast.parse(self.files[path].read_text(encoding="utf-8"))) if _acts(node)]
+        return not any(node.body[0].lineno <= line <= (node.end_lineno or line) for node in functions)
+
+    def _walks(self, path: str) -> bool:
+        """Whether a test imports modules by the places of their files: no import in it tells which."""
+        return 'import_module(".".join(' in self.files[path].read_text(encoding="utf-8")
 
     def _distances(self, path: str) -> dict[str, int]:
         distances, waiting = {path: 0}, [path]
@@ -63,6 +78,10 @@ class Nearest:
         if not parts[0].startswith(tuple(rf"{source}\." for source in SOURCES)):
             return set()
         return {name for name in self.modules if re.fullmatch("".join(parts), name)}
+
+
+def _acts(node: ast.AST) -> TypeGuard[ast.FunctionDef | ast.AsyncFunctionDef]:
+    return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
 
 
 def _module(path: str) -> str:

@@ -179,6 +179,21 @@ def test_tests_that_run_a_line_are_asked_before_the_nearest_files(tree: Path, tm
     assert unknown.tests(imported) == [clamped]
 
 
+def test_what_a_module_defines_is_tried_first_on_tests_that_import_all_of_a_package(tree: Path) -> None:
+    walker = tree / "tests/unit/test_everything.py"
+    by_place = "importlib.import_module({})".format('".".join(f.parts)')
+    walker.write_text(f"def test_all(): [{by_place} for f in FILES]\n")
+    choice = Choice(Nearest(tree), None, files=1)
+    lines = SOURCE.splitlines()
+    default = replace(mutation("    value: float = 2.5", "    value: float = 5.0"))
+    assert choice.tests(replace(default, line=lines.index("    value: float = 2.5") + 1)) == [
+        "tests/unit/test_everything.py",
+        "tests/unit/test_clamping.py",
+    ]
+    inside = replace(default, line=lines.index("    number = 0") + 1)
+    assert choice.tests(inside) == ["tests/unit/test_clamping.py"]
+
+
 def test_a_fixtures_lines_are_run_for_its_whole_file(tmp_path: Path) -> None:
     (tmp_path / "drivers.py").write_text("x = 1\n")
     data = CoverageData(str(tmp_path / "covered"))
