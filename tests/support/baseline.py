@@ -22,7 +22,7 @@ from tests.support.repository import REPOSITORY
 FOLDER = REPOSITORY / "tests" / "baseline"
 _ANEW = "MAKE_BASELINES"
 _SHARE = "BASELINE_SHARE"
-_DIGITS = 10
+_DIGITS = 12
 _MOST_SHOWN = 12
 _asked: set[str] = set()
 

@@ -170,6 +170,8 @@ def test_hypotheses_scored_by_faces(kind: Kind) -> None:
     }
     if kind == "plane":
         values["without faces"] = told(scorer(Mechanisms(frozenset({"faces"}))).better(doubtful))
+        faceless = scorer(Mechanisms(frozenset({"faces"}))).without_errors(contact_map)
+        values["without errors or faces"] = [sorted(one.left_out) for one in faceless.placed]
         values["without doubts"] = told(scorer(Mechanisms(frozenset({"doubts"}))).better(doubtful))
     else:
         mesh = sharp.solid(better)

@@ -55,6 +55,9 @@ def test_a_belief() -> None:
     belief = Belief(rows, np.full(50, 0.02)).predict(np.array([0.01, -0.02, 0.4]), MotionNoise(), rng)
     weighted = belief.weight(-0.5 * np.linspace(0.0, 5.0, 50) ** 2)
     assert weighted is not None
+    unlikely = belief.weight(-900.0 - 0.5 * np.linspace(0.0, 5.0, 50) ** 2)  # its exponential is zero
+    assert unlikely is not None
+    assert np.allclose(unlikely.weights, weighted.weights, atol=1e-12)
     found, again = weighted.estimate(), weighted.resample(rng)
     values = {
         "rows": digest(belief.rows),

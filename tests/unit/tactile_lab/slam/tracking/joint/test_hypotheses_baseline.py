@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,11 @@ import numpy as np
 import pytest
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape
+from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
+from tactile_lab.slam.shape.solids.prism import Prism
+from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -207,6 +212,7 @@ def test_grasps_are_placed_later(kind: Kind) -> None:
     start = judge.score(doubtful)
     aside = judge.score(doubtful.with_placed(4, doubtful.placed[4].put_aside()))
     middle = judge.score(known.with_placed(2, known.placed[2].put_aside()))
+    two = known.with_placed(2, known.placed[2].put_aside()).with_placed(3, known.placed[3].put_aside())
     values = {
         "start": told(start),
         "pushed": [told(one) for one in propose_pushes(start, NOISE, SETTINGS, judge)],
@@ -214,6 +220,7 @@ def test_grasps_are_placed_later(kind: Kind) -> None:
         "later": told(associate_deferred(aside, NOISE, SETTINGS, anywhere, judge)),
         "later without pushes": told(associate_deferred(start, NOISE, SETTINGS, None, judge, pushes=False)),
         "middle": told(associate_deferred(middle, NOISE, SETTINGS, None, judge)),
+        "two in a row": told(associate_deferred(judge.score(spoilt(two, 3, [0, 1, 2])), NOISE, SETTINGS, None, judge)),
     }
     assert_baseline(f"tracking/joint/deferred-{kind}", values, **CLOSE)
 
@@ -277,6 +284,34 @@ def test_an_outline_as_uncertain_as_the_poses(faceted: bool) -> None:
         "kernel": kernel(known),
     }
     assert_baseline(f"tracking/certainty/outline-{'faces' if faceted else 'field'}", values, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("shape", "name", "kind"),
+    [
+        ("box-12x6x6", "planes", "table"),
+        ("box-12x6x6", "outline", "table"),
+        ("cylinder", "outline", "table"),
+        ("sphere", "field", "table"),
+        ("box-12x6x6", "planes", "space"),
+    ],
+)
+def test_a_surface_as_uncertain_as_the_poses(shape: str, name: str, kind: Kind) -> None:
+    """A block by its planes and by its outline, a cylinder by its outline, a ball by its field; a block held free."""
+    known = true_placed(session(kind, shape, count=6), kind, off=0.3)
+    fitted = known.fit()
+    makers: dict[str, Callable[[], FittedShape]] = {
+        "planes": lambda: Polyhedron.fit(fitted, upright=kind == "table"),
+        "outline": lambda: Prism.fit(fitted, best_shape),
+        "field": lambda: GpisShape(fitted),
+    }
+    model = makers[name]()
+    seen = known.contacts
+    sigma_m = np.full(len(seen), 0.0004)
+    places = SurfaceMesh(seen.points_m, np.array([[0, 1, 2]]), sigma_m, seen.normals, is_closed=True)
+    found = propagate_pose_uncertainty(places, model, known, NOISE)
+    values = {"sigma in mm": 1e3 * found.sigma_m, "shared in mm": 1e3 * found.shared_sigma_m}
+    assert_baseline(f"tracking/certainty/surface-{shape}-{name}-{kind}", values, rtol=1e-4)
 
 
 def test_the_cost_of_a_hypothesis_is_the_sum_of_its_parts() -> None:

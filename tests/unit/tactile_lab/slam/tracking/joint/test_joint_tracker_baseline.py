@@ -46,7 +46,9 @@ def tracked(kind: Kind, data: SimulatedGrasps, **changes: Any) -> tuple[JointTra
         tracker.resample()
         settings = [[one.map.settings.amplitude_m, one.map.settings.length_m] for one in tracker.hypotheses]
         costs = [one.cost for one in tracker.hypotheses]
-        said.append([explained, tracker.effective_count, found.pose, digest(found.covariance), costs, settings])
+        spreads = [digest(found.covariance), digest(tracker.estimate().covariance)]
+        said.append([explained, tracker.effective_count, found.pose, spreads, costs, settings])
+        assert len(tracker.map.placed) > 2 or tracker.refined is tracker.map
     return tracker, said
 
 
@@ -54,11 +56,12 @@ def ended(tracker: JointTracker) -> dict[str, Any]:
     """What a finished session tells."""
     tracker.finish()
     best = tracker.hypotheses[0]
+    assert tracker.refined is tracker.map
     return {
         "best": told(best),
         "costs": [one.cost for one in tracker.hypotheses],
         "rivals": [one.cost for one in tracker.rivals],
-        "contenders": len(tracker.contenders),
+        "contenders": [np.linalg.norm(one.map.rows) for one in tracker.contenders],
         "covariances": digest([one.covariance for one in best.map.placed]),
         "common": digest(tracker.common_covariances),
         "acted": sorted(tracker.mechanisms.changed),
@@ -72,6 +75,14 @@ def test_a_rectangle_that_was_thrown() -> None:
     assert_baseline(
         "tracking/sessions/thrown", {"said": said, "refined": refined, **ended(tracker)}, rtol=1e-4, atol=1e-6
     )
+
+
+def test_a_rectangle_between_grasps() -> None:
+    """In the plane, with all settings as they are: what is shown before the end, with flat faces."""
+    tracker, said = tracked("plane", session("plane", count=6, seed=1), joint={}, kernel_every=4)
+    values = {"said": said, "best": told(tracker.hypotheses[0]), "refined": tracker.refined.rows}
+    assert np.abs(values["refined"] - tracker.map.rows).max() > 1e-3
+    assert_baseline("tracking/sessions/between-grasps", values, **CLOSE)
 
 
 def test_a_pentagon_with_wrong_contacts() -> None:
@@ -95,9 +106,12 @@ def test_an_ellipse_left_in_place_and_felt() -> None:
 
 
 def test_a_block_on_the_table() -> None:
-    """In space, with a step left in place, finished without reading backwards."""
+    """In space, with a step left in place, finished without reading backwards and without other places on the solid."""
     data = unheld(session("table", count=4), 2)
-    tracker, said = tracked("table", data, joint={**QUICK, "backwards": False, "final_iterations": 10})
+    without = ["placing on the object", "regular faces"]
+    tracker, said = tracked(
+        "table", data, joint={**QUICK, "backwards": False, "final_iterations": 10, "without": without}
+    )
     assert_baseline("tracking/sessions/block", {"said": said, **ended(tracker)}, **CLOSE)
 
 
