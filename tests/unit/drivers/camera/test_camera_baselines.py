@@ -38,7 +38,7 @@ BOARDS: dict[str, AnyBoard] = {
     "charuco": CharucoBoard(),
     "chessboard": Chessboard(columns=8, rows=6),
     "april": AprilGrid(columns=4, rows=3, measured_bar_mm=99.7),
-    "april-narrow": AprilGrid(columns=3, rows=4, border=1),
+    "april-narrow": AprilGrid(columns=3, rows=4, border=1, first_number=5),
 }
 MARKERS = MarkerSettings(
     world_T_worldmarker=RigidTransform(translation_m=(0.12, 0.02, 0.0), rpy_rad=(float(np.pi), 0.0, 0.3)),

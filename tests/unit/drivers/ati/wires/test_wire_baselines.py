@@ -11,6 +11,7 @@ import pytest
 
 from drivers.ati.nano17 import Nano17, Nano17Settings
 from drivers.ati.protocols.cal_file import AtiCalibration
+from drivers.ati.protocols.modbus import SLAVE, START_STREAM, Frame
 from drivers.ati.wires.can_wire import CanWire
 from drivers.ati.wires.controller_wire import ControllerWire
 from drivers.ati.wires.digital_wire import DigitalWire
@@ -67,11 +68,19 @@ def volts_wire() -> GaugeVoltsWire:
     return GaugeVoltsWire(replace(volts, output_range_V=20.0))
 
 
+class Unwilling(DigitalUnit):
+    """A digital sensor that answers, but does not stream."""
+
+    def _answer(self, request: Frame) -> Frame:
+        return Frame(SLAVE, START_STREAM, b"\0") if request.function == START_STREAM else super()._answer(request)
+
+
 WIRES: dict[str, tuple[Callable[[], Unit], Callable[[], ForceWire]]] = {
     "box": (lambda: NetBoxUnit(sensor(), 100), lambda: RdtWire(1e6, 1e6)),
     "digital": (lambda: DigitalUnit(sensor(), 100.0), DigitalWire),
     "digital slot 2": (lambda: DigitalUnit(sensor(), 100.0), lambda: DigitalWire(slot=2)),
     "digital other": (lambda: DigitalUnit(sensor(), 100.0), lambda: DigitalWire(serial="FT9")),
+    "digital unwilling": (lambda: Unwilling(sensor(), 100.0), DigitalWire),
     "ascii": (lambda: ControllerUnit(sensor()), lambda: ControllerWire("ascii", COUNTS_PER_N, COUNTS_PER_Nm)),
     "binary": (lambda: ControllerUnit(sensor()), lambda: ControllerWire("binary", COUNTS_PER_N, COUNTS_PER_Nm)),
     "can": (lambda: CanUnit(sensor()), CanWire),
