@@ -10,16 +10,13 @@ both are compared.
 from __future__ import annotations
 
 import argparse
-import json
+import subprocess
+import sys
 import tempfile
-import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
 
 from sessions.conductor.progress import NullProgress
 from sessions.guided.operator import Ask, Panel, Request, Together
@@ -29,6 +26,7 @@ from tactile_lab.view.feed import ViewFeed
 from tactile_lab.viewers.live.feed import LiveFeed
 from tactile_lab.workflow.attending import Attendance
 from tactile_lab.workflow.running import SessionRequest, run_session
+from tests.support.repository import REPOSITORY
 
 TOKEN = "a-token-of-the-tests-0123456789"
 HERE = "127.0.0.1"
@@ -64,18 +62,19 @@ def guided(root: Path, rig: str, grasps: int, *, watched: bool, seed: int = 3) -
     """Run a guided session, led by a simulated operator, with the estimation's cheapest method."""
     request = SessionRequest(rig, "box-10x6x4", root, method="odometry", seed=seed, grasps=grasps)
     operator = SimulatedOperator([Cue(_holds, (Request(Ask.CAPTURE),))] * grasps)
+    counts: list[int] = []
     with ExitStack() as stack:
         onlookers: tuple[ViewFeed | LiveFeed, ...] = ()
-        frames: list[int] = []
         if watched:
             page = stack.enter_context(ViewFeed(HERE, 0, TOKEN, "watched"))
             live = stack.enter_context(LiveFeed(rig, HERE, 0, TOKEN, "watched"))
             onlookers = page, live
-            frames = stack.enter_context(viewers(live.url))
+            counts = stack.enter_context(viewers(live.url))
         operators = Together(operator, *(one for one in onlookers if isinstance(one, ViewFeed)))
         attendance = Attendance(operators, True, "keys", pace=0.0, onlookers=onlookers)
         finished = run_session(request, NullProgress(), attendance)
-        return Watched(finished.folder, len(frames), sum(one.dropped for one in onlookers))
+        dropped = sum(one.dropped for one in onlookers)
+    return Watched(finished.folder, sum(counts), dropped)
 
 
 def _holds(panel: Panel) -> bool:
@@ -85,55 +84,18 @@ def _holds(panel: Panel) -> bool:
 
 @contextmanager
 def viewers(url: str) -> Iterator[list[int]]:
-    """One viewer that reads and one that does not; gives the sizes of the frames that the first one receives."""
-    sizes: list[int] = []
-    with _connected(url) as reading, _connected(url) as idle:
-        threads = [
-            threading.Thread(target=_read, args=(reading, sizes), daemon=True),
-            threading.Thread(target=_subscribe, args=(idle,), daemon=True),
-        ]
-        for thread in threads:
-            thread.start()
-        yield sizes
-        reading.close()
-        idle.close()
-        for thread in threads:
-            thread.join(PATIENCE_s)
+    """One viewer that reads and one that does not; gives, at the end, the number of frames that the first one received.
 
-
-def _connected(url: str) -> ClientConnection:
-    """The server announces its topics to it once the session has said something."""
-    return connect(url, subprotocols=["foxglove.sdk.v1"], max_size=None, open_timeout=PATIENCE_s, close_timeout=1.0)  # type: ignore[list-item]
-
-
-def _read(socket: ClientConnection, sizes: list[int]) -> None:
-    """Ask for every topic and take every frame."""
+    They have a process of their own, as everybody's have: in this one they would take the interpreter from the session.
+    """
+    counts: list[int] = []
+    words = [sys.executable, "-m", "tests.support.live_viewers", url]
+    process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=REPOSITORY)
     try:
-        for frame in socket:
-            if isinstance(frame, bytes):
-                sizes.append(len(frame))
-            else:
-                _ask(socket, frame)
-    except ConnectionClosed:
-        return
-
-
-def _subscribe(socket: ClientConnection) -> None:
-    """Ask for the topics that are announced first, and read nothing of them."""
-    try:
-        while not _ask(socket, socket.recv()):
-            pass
-    except ConnectionClosed:
-        return
-
-
-def _ask(socket: ClientConnection, frame: str | bytes) -> bool:
-    """Whether the frame announced topics, which are now asked for."""
-    channels = json.loads(frame).get("channels") if isinstance(frame, str) else None
-    if channels:
-        wanted = [{"id": one["id"] + 100, "channelId": one["id"]} for one in channels]
-        socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
-    return bool(channels)
+        yield counts
+    finally:
+        told, _ = process.communicate("end\n", timeout=PATIENCE_s)
+        counts.append(int(told))
 
 
 def main() -> None:
