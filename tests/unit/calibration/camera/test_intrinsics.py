@@ -66,6 +66,15 @@ def test_views_that_no_lens_fits_give_no_figures() -> None:
         calibrate_lens(scattered)
 
 
+def test_a_lens_without_deviations_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    def undetermined(*arguments: object, **options: object) -> tuple[object, ...]:
+        return 1.23, np.eye(3), np.zeros(5), None, None, np.full(9, np.nan), None, np.zeros(8)
+
+    monkeypatch.setattr(cv2, "calibrateCameraExtended", undetermined)
+    with pytest.raises(ConfigurationError, match=r"no lens fits the views \(reprojection error 1\.2 px\)"):
+        calibrate_lens(views(8))
+
+
 def test_few_views_all_alike_fail_with_what_is_missing() -> None:
     rng, pose = np.random.default_rng(0), board_poses(BOARD, LENS, 1, np.random.default_rng(3))[0]
     exact = LENS.project(transform_points(pose, BOARD.corners_m))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
 
-from calibration.camera.views import BoardView, Coverage, adds_something, coverage, rough_lens
+from calibration.camera.views import BoardView, Coverage, adds_something, coverage, rough_lens, view_of
 from drivers.core.poses import transform_points
 
 SIZE_px, SIDE_m = (640, 480), 0.2
@@ -86,3 +86,21 @@ def test_a_view_adds_something_if_it_differs_from_every_other() -> None:
     assert not adds_something(other, [one, nearly])
     assert adds_something(seen(x_m=0.12), [one])
     assert adds_something(seen(z_m=0.7), [one])
+
+
+class InALine:
+    """A board of which only corners in one line are seen."""
+
+    pattern, point_count, size_m, scale = "board", 20, (0.2, 0.1), 1.0
+
+    def blurs_px(self, image: np.ndarray) -> list[float]:
+        return [0.8, float("inf")]
+
+    def match_corners(self, image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        along = np.arange(9.0)
+        return np.column_stack([0.01 * along, 0.0 * along, 0.0 * along]), np.column_stack([20 * along, 5 + 0.0 * along])
+
+
+def test_corners_that_fit_no_perspective_are_told_of() -> None:
+    told = view_of("a", np.zeros((480, 640), np.uint8), InALine())  # type: ignore[arg-type]
+    assert told == "its corners lie elsewhere than the description says: count its columns and rows"

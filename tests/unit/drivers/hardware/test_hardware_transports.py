@@ -138,6 +138,13 @@ def test_a_serial_port_carries_bytes_both_ways_and_is_ours_alone() -> None:
     transport.close()
 
 
+def test_a_serial_port_that_was_never_opened_says_so() -> None:
+    port = SerialTransport("ft/MF", "/dev/nothing-here", 9600, CLOCK)
+    for act in (port.receive, lambda: port.send(b"x")):
+        with pytest.raises(DeviceError, match=r"ft/MF: the transport is not open\. Connect the device first"):
+            act()
+
+
 def test_a_serial_port_that_is_none_says_so() -> None:
     with pytest.raises(DeviceError, match=r"ft/MF: there is no serial port /dev/nothing-here"):
         SerialTransport("ft/MF", "/dev/nothing-here", 9600, CLOCK).open()

@@ -229,6 +229,7 @@ def test_a_folded_or_repeated_coupled_table_is_refused() -> None:
     ("content", "problem"),
     [
         ({"sr_calibrations": [["FFJ1", [[0.0, 0.0], [1.0, 1.0]]]] * 2}, "FFJ1 more than once"),
+        ({"sr_calibrations": [], "sr_calibrations_coupled": [[["THJ1", "THJ2"], []]] * 2}, "THJ1, THJ2 more than once"),
         ({"sr_calibrations": [["FFJ1", [[0.0, 0.0, 2.0]]]]}, r"sr_calibrations\.0\.1\.0"),
         ({"sr_calibrations": [["FFJ1", [[0.0, float("nan")], [1.0, 1.0]]]]}, "finite number"),
         ({"calibrations": []}, "sr_calibrations"),
