@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,11 @@ from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.motion import Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.recording.session_events import EventKind
+from sessions.rig_runtime.flight_recorder import CycleSnapshot
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
 TIP = HandShape((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
+_FRICTION_counts_s_m = 1e4
 _MIXTURES = np.cos(np.outer(np.arange(len(JOINTS)), np.arange(1, 4)))
 """Fixed mixtures of the joints: three numbers change if any joint does."""
 
@@ -37,6 +40,14 @@ class TracedWorld(DiscWorld):
         super().cycle()
         loads_N = list(self.perception.loads_N().values())
         self.parts[-1][1].append(np.concatenate([self.base_q, self.joints_rad @ _MIXTURES, loads_N]))
+
+    def snapshot(self) -> CycleSnapshot:
+        """With strain gauges that show how fast the positioner moves, as friction does."""
+        rows = self.parts[-1][1][-2:]
+        way_m = float(np.linalg.norm(rows[-1][:3] - rows[0][:3])) if rows else 0.0
+        return replace(
+            super().snapshot(), motor_torques=np.full(20, _FRICTION_counts_s_m * way_m / self.cycle_ns * 1e9)
+        )
 
     def _mark(self, kind: EventKind, fingers: tuple[str, ...] = FINGERS) -> object:
         self.part(f"{kind}" if fingers == FINGERS else f"{kind} {'-'.join(fingers)}")

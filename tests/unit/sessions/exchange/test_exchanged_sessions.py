@@ -15,7 +15,7 @@ import pytest
 from sessions.exchange import addresses
 from sessions.exchange.archives import ArchiveLimits, export_archive, import_archive
 from sessions.exchange.extracting import Piece, extract
-from sessions.exchange.parquet_tables import unit_of
+from sessions.exchange.parquet_tables import unit_of, write_parquet
 from sessions.exchange.sample_tables import SampleTables
 from sessions.exchange.table_files import picture_suffix, rows_of, write_csv, write_hdf5
 from sessions.recording.running_session import create_session
@@ -144,6 +144,10 @@ def test_tables_of_samples(tmp_path: Path) -> None:
         said(lambda: write_csv(tables, tmp_path / "csv"), tmp_path),
         said(lambda: write_hdf5(tables, tmp_path / "samples.h5"), tmp_path),
     ]
+    pytest.importorskip("pyarrow")
+    folder = tmp_path / "parquet"
+    told["parquet"] = [write_parquet(tables, folder), sorted(path.name for path in folder.iterdir())]
+    told["parquet again"] = said(lambda: write_parquet(tables, folder), tmp_path)
     told["units"] = [unit_of(name) for name in ("FFJ1_rad", "x_m", "fx_N", "tx_Nm", "stamp_ns", "nx", "m", "kind_x")]
     told["suffixes"] = [picture_suffix(content) for content in (b"\x89PNG", b"\xff\xd8", b"")]
     assert_baseline("sessions/exchange/samples", told)

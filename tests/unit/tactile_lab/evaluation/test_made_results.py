@@ -39,14 +39,14 @@ from tests.support.made_results import (
     yaw_pose,
 )
 
-KINDS = ("2, box", "3, box", "2, outline", "2, no shape", "2, lost")
+KINDS = ("2, box", "3, box", "2, outline", "2, lost")
 CLOSE = {"rtol": 1e-5, "atol": 1e-7}
 
 
 def made(kind: str, folder: Path) -> dict[str, Any]:
     dimension, what = int(kind[0]), kind[3:]
     written(folder, dimension, "lost" if what == "lost" else "partial")
-    known = truth(shaped=what != "no shape", outline=what == "outline")
+    known = truth(shaped=what != "lost", outline=what == "outline")
     return evaluate(folder, known, "a box").as_json()
 
 

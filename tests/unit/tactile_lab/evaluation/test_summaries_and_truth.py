@@ -239,6 +239,7 @@ def test_clocks_of_camera_and_hand() -> None:
         "too few": (0.02, ((0.5, 1.2),), 20),
         "hardly enough": (0.02, ((0.5, 1.6),), 60),
         "far too late": (0.6, ((0.5, 3.5),), 40),
+        "far too early": (-0.6, ((0.5, 3.5),), 40),
     }
     for name, (offset_s, holds, count) in cases.items():
         stamps = np.linspace(0.0, 8.0, count)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
@@ -9,11 +10,11 @@ from gtsam import Pose3, Rot3
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.frames import Detection, Frame, SeenMarker
 from drivers.camera.markers import MarkerSettings
-from drivers.camera.packet import encode_packet
+from drivers.camera.packet import decode_packet, encode_packet
 from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 from drivers.core.transports import Datagram
-from tactile_lab.evaluation.truth.marker_truth import MarkerTruth, report_json
+from tactile_lab.evaluation.truth.marker_truth import Basis, MarkerTruth, report_json
 
 LENS = CameraCalibration(focal_px=(686.0, 687.0), centre_px=(322.8, 237.4), size_px=(640, 480))
 WRONG = LENS.model_copy(update={"distortion": (-0.3, 0.1, 0.0, 0.0)})
@@ -90,3 +91,14 @@ def test_markers_that_are_not_those_recorded_give_no_truth_and_say_why(changes: 
     truth = MarkerTruth(LENS, MARKERS.model_copy(update=changes), recorded)
     assert truth(recorded[0]) is None
     assert list(truth.report.refused.values()) == [1]
+
+
+def test_pictures_are_looked_at_again_where_that_is_asked_for() -> None:
+    """The picture shows nothing of what its recorded corners say."""
+    corners = frame(1, poses(1)[0])
+    black = cv2.imencode(".png", np.zeros((480, 640), np.uint8))[1].tobytes()
+    pictured = Datagram(encode_packet(decode_packet(corners), black), 2_000_000)
+    bases: tuple[Basis, ...] = ("corners", "pictures")
+    seen = {basis: MarkerTruth(LENS, MARKERS, [corners, pictured], basis)(pictured) for basis in bases}
+    assert seen["corners"] is not None
+    assert seen["pictures"] is None
