@@ -8,7 +8,13 @@ import pytest
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.baselines.edge_features import EdgeFeatureField, EdgeFeatureShape
-from tactile_lab.slam.shape.baselines.implicit import contour_of, mesh_of, vertex_normals
+from tactile_lab.slam.shape.baselines.implicit import (
+    contour_of,
+    contour_of_nodes,
+    mesh_of,
+    mesh_of_nodes,
+    vertex_normals,
+)
 from tactile_lab.slam.shape.baselines.nagata import NagataShape, edge_curvature, patch_points
 from tactile_lab.slam.shape.baselines.occupancy import OccupancyShape
 from tactile_lab.slam.shape.baselines.point_cloud import PointCloudShape
@@ -97,6 +103,9 @@ def test_nagata_shapes() -> None:
         "faces": digest(box.faces),
     }
     assert_baseline("shape/baselines/nagata_shapes", values)
+    assert by_angle.faces.shape == (0, 3)
+    with pytest.raises(ShapeError, match="enclose nothing"):
+        NagataShape.of(bent_m, bent, np.full(22, 0.001), order[::-1])
 
 
 def test_which_few_contacts_nagata_patches_can_join() -> None:
@@ -198,3 +207,30 @@ def test_outlines_and_surfaces_of_functions() -> None:
         mesh_of(discs, low[:2], high[:2], 0.1, sigma)
     with pytest.raises(ShapeError, match="no outline"):
         contour_of(balls, low, high, 0.1, sigma)
+    with pytest.raises(ShapeError, match="no surface"):
+        mesh_of_nodes(low[:2], np.ones((3, 3)), 0.1, sigma)
+    with pytest.raises(ShapeError, match="no outline"):
+        contour_of_nodes(low, np.ones((3, 3, 3)), 0.1, sigma)
+    with pytest.raises(ShapeError, match="5005 x 4005 nodes is too large"):
+        contour_of(discs, np.zeros(2), np.array([5.0, 4.0]), 0.001, sigma)
+
+
+def test_planar_models_have_no_surface_and_spatial_ones_no_outline() -> None:
+    """Also with as many contacts as a place has coordinates."""
+    flat_m, flat = contacts_on_polygon(l_block(), 3, seed=2)
+    for flat_shape in (
+        NagataShape.of(*contacts_on_polygon(l_block(), 12, seed=2), np.full(12, 0.001)),
+        PointCloudShape.of(*contacts_on_polygon(l_block(), 40, seed=3), np.full(40, 0.001)),
+        OccupancyShape.of(flat_m, flat, np.full(3, 0.001)),
+        EdgeFeatureShape(EdgeFeatureField(flat_m, flat), 0.001),
+    ):
+        with pytest.raises(ShapeError, match="no surface"):
+            flat_shape.mesh()
+    for solid_shape in (
+        NagataShape.of(*on_box(40, seed=4), np.full(40, 0.001)),
+        PointCloudShape.of(*on_box(50, seed=2), np.full(50, 0.001)),
+        OccupancyShape.of(*on_box(4, seed=5), np.full(4, 0.001)),
+        EdgeFeatureShape(EdgeFeatureField(*on_box(4, seed=8)), 0.001),
+    ):
+        with pytest.raises(ShapeError, match="no outline"):
+            solid_shape.contour()

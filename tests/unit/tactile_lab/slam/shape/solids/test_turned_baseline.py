@@ -22,10 +22,12 @@ from tests.support.digest import digest
 AXIS_m = np.array([0.006, -0.004])
 
 
-def around_cone(count: int, *, within_rad: float = 2 * np.pi, slope: float = 0.1) -> tuple[Array, Array]:
+def around_cone(
+    count: int, *, within_rad: float = 2 * np.pi, slope: float = 0.1, lowest_m: float = 0.0
+) -> tuple[Array, Array]:
     """Exact contacts on a cone about :data:`AXIS_m`, 34 mm at its foot, and every sixth on its top at 70 mm."""
     k = np.arange(count)
-    angles, heights_m = within_rad * (k / count), 0.07 * ((0.37 * k) % 1.0)
+    angles, heights_m = within_rad * (k / count), lowest_m + (0.07 - lowest_m) * ((0.37 * k) % 1.0)
     out = np.column_stack([np.cos(angles), np.sin(angles)])
     reach_m = 0.034 - slope * heights_m
     walls = np.column_stack([AXIS_m + reach_m[:, None] * out, heights_m])
@@ -118,10 +120,11 @@ def test_lines_that_sweep_a_surface() -> None:
 
 
 def profiles() -> dict[str, Turned]:
-    """Axis and kernel given: walls that narrow, with free places that are upright, and that widen upward."""
+    """Axis and kernel given: walls that narrow, that are upright, touched from high up only, and that widen upward."""
     found = {}
-    for name, slope in (("narrow", 0.15), ("upright", 0.0), ("wide", -0.25)):
-        field = field_of(*shaken(*around_cone(30, slope=slope)))
+    for name, slope in (("narrow", 0.15), ("upright", 0.0), ("high", 0.0), ("wide", -0.25)):
+        lowest_m = 0.045 if name == "high" else 0.0
+        field = field_of(*shaken(*around_cone(30, slope=slope, lowest_m=lowest_m)))
         contacts = weighted(field.contacts_m, field.normals)
         within, _ = split(contacts, AXIS_m)
         within /= np.linalg.norm(within, axis=1, keepdims=True)
