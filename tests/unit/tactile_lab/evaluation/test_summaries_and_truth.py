@@ -97,7 +97,7 @@ def test_comparisons_of_methods() -> None:
     told: dict[str, Any] = {"table": table(found), "short": short_table(found), "markdown": markdown(found)}
     told["csv"] = rows_csv(runs()).splitlines()
     told["figures"] = [[each.method, each.runs, each.failed, [asdict(f) for f in each.figures[:3]]] for each in found]
-    assert_baseline("evaluation/comparison", told, rtol=1e-9)
+    assert_baseline("evaluation/comparison", told)
 
 
 def test_sweeps_of_sessions() -> None:
