@@ -138,7 +138,10 @@ def test_a_terminal_without_a_width_still_shows_everything(recorded, tmp_path):
 
 @pytest.mark.parametrize("words", [("--version",), ("session", "show", "-h"), ("--show-completion", "bash")])
 def test_an_answer_that_cannot_be_written_is_told_whoever_writes_it(words):
-    ended = run(*words, into="/dev/full")
+    # from a shell that stays: completion is written for the shell among the program's parents
+    program = [sys.executable, "-m", "tactile_lab", *words]
+    typed = ["bash", "-c", '"$@" >/dev/full; exit $?', "bash", *program]
+    ended = subprocess.run(typed, stderr=subprocess.PIPE, text=True, timeout=120, check=False, cwd=REPOSITORY)
     assert ended.returncode == 1
     assert ended.stderr == "error: standard output: the disk is full. Free some space, or send it elsewhere\n"
 
