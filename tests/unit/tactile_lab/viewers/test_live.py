@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import json
 import socket
@@ -25,6 +26,7 @@ from tactile_lab.process_feed import QUEUE_LENGTH
 from tactile_lab.viewers.live.door import Door
 from tactile_lab.viewers.live.feed import LiveFeed
 from tactile_lab.viewers.live.outbox import MOST_PASSING, Outbox
+from tactile_lab.viewers.live.server import Viewer
 from tests.support import told_session
 
 TOKEN = "t" * 24
@@ -215,6 +217,28 @@ def test_of_what_passes_the_oldest_gives_way_and_of_what_lasts_the_newest_stays(
         frames.append(run(outbox.take()))
     assert outbox.left_out == 3
     assert frames == [*(b"%d" % number for number in range(3, MOST_PASSING + 3)), b"surface 2"]
+
+
+def test_a_viewer_that_was_too_slow_is_told_how_many_messages_it_missed():
+    sent: list[str | bytes] = []
+
+    class Connection:
+        async def send(self, frame: str | bytes) -> None:
+            sent.append(frame)
+
+    async def drain(viewer: Viewer) -> None:
+        writing = asyncio.create_task(viewer.write())
+        while len(sent) < MOST_PASSING + 1:
+            await asyncio.sleep(0)
+        writing.cancel()
+
+    viewer = Viewer(Connection())  # type: ignore[arg-type]
+    for number in range(MOST_PASSING + 3):
+        viewer.outbox.put(b"%d" % number)
+    asyncio.run(drain(viewer))
+    (told,) = (json.loads(frame) for frame in sent if isinstance(frame, str))
+    assert (told["op"], told["level"]) == ("status", 1)
+    assert "3 messages were left out; all are recorded" in told["message"]
 
 
 def run(work: Any) -> Any:
