@@ -4,7 +4,7 @@
 ``surface.stl``     the surface, for CAD and printing
 ``visual.obj``      the same, for simulators
 ``surface.glb``     the same, coloured by its standard deviation
-``part_N.stl``      convex parts for collisions
+``part_N.obj``      convex parts for collisions
 ``NAME.urdf``       ROS, PyBullet, Drake, Isaac
 ``NAME.sdf``        Gazebo, Drake
 ``NAME.xml``        MuJoCo: the body on a floor
@@ -82,19 +82,18 @@ def _write_all(folder: Path, model: SolidModel, formats: Collection[Format]) -> 
     write_whole(folder / "model.json", json_text(model.as_json()))
 
 
-def _stl(mesh: trimesh.Trimesh) -> bytes:
-    content = mesh.export(file_type="stl")
-    assert isinstance(content, bytes)  # of this format
-    return content
+def _obj(mesh: trimesh.Trimesh) -> str:
+    return str(mesh.export(file_type="obj", include_normals=False, include_color=False, digits=9))
 
 
 def _write_stl(folder: Path, model: SolidModel) -> None:
-    write_whole(folder / "surface.stl", _stl(model.surface))
+    content = model.surface.export(file_type="stl")
+    assert isinstance(content, bytes)  # of this format
+    write_whole(folder / "surface.stl", content)
 
 
 def _write_obj(folder: Path, model: SolidModel) -> None:
-    text = model.surface.export(file_type="obj", include_normals=False, include_color=False, digits=9)
-    write_whole(folder / VISUAL_FILE, str(text))
+    write_whole(folder / VISUAL_FILE, _obj(model.surface))
 
 
 def _write_glb(folder: Path, model: SolidModel) -> None:
@@ -105,7 +104,7 @@ def _write_glb(folder: Path, model: SolidModel) -> None:
 
 def _write_parts(folder: Path, model: SolidModel) -> None:
     for number, part in enumerate(model.parts):
-        write_whole(folder / part_file(number), _stl(part))
+        write_whole(folder / part_file(number), _obj(part))
 
 
 def _write_usd(folder: Path, model: SolidModel) -> None:

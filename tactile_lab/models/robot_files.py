@@ -1,6 +1,6 @@
 """Text of a rigid body in the formats of robot simulators: URDF, SDF and MJCF.
 
-Each names the mesh files beside it: ``visual.obj`` as it looks, ``part_N.stl`` for collisions.
+Each names the mesh files beside it: ``visual.obj`` as it looks, ``part_N.obj`` for collisions.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ _FLOOR_SIZE_m = "1 1 0.1"
 
 
 def part_file(number: int) -> str:
-    """Name of a convex part's file."""
-    return f"part_{number}.stl"
+    """Name of a convex part's file: OBJ, the one format of them that Drake takes for collisions."""
+    return f"part_{number}.obj"
 
 
 def urdf(model: SolidModel) -> str:

@@ -17,6 +17,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import SessionDataError, given_by_a_person
 from drivers.simulation.mesh_object import convex_pieces
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
+from tactile_lab.evaluation.files.tables import RERUN
 
 ASSUMED_DENSITY_kg_m3 = 600.0
 """Between a filled carton and wood; an unknown object's mass is this times its estimated volume."""
@@ -141,7 +142,8 @@ def make_model(
 
 def _read_surface(path: Path) -> tuple[trimesh.Trimesh, Array]:
     if not path.is_file():
-        hint = "Too few contacts enclose nothing: touch the object more often"
+        estimated = (path.parent / "trajectory.csv").is_file()
+        hint = "Too few contacts enclose nothing: touch the object more often" if estimated else RERUN
         raise SessionDataError("there is no estimated surface", where=str(path), hint=hint)
     with given_by_a_person():
         found = read_estimated_mesh(path)

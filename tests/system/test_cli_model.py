@@ -42,4 +42,8 @@ def test_a_session_without_a_shape_says_so(inside, session_copy, tmp_path):
     answer = inside("model", "export", session_copy, "--out", tmp_path / "box")
     assert answer.code == 2
     assert "there is no estimated surface" in answer.err
+    assert "touch the object more often" in answer.err
+    (session_copy / "results" / "trajectory.csv").unlink()  # as of a session that was interrupted
+    answer = inside("model", "export", session_copy, "--out", tmp_path / "box")
+    assert "Replay the session" in answer.err
     assert not (tmp_path / "box").exists()

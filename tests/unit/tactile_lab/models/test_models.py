@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -116,6 +117,16 @@ def test_sdf_names_files_that_are_there(folder: Path) -> None:
     assert len(files) > 2
     assert all((folder / file).is_file() for file in files)
     assert {mu.text for mu in root.iter("mu")} == {"0.7"}
+
+
+@pytest.mark.parametrize("file", ["angle.urdf", "angle.sdf", "angle.xml"])
+def test_bodies_collide_by_closed_convex_parts_as_obj(folder: Path, model: SolidModel, file: str) -> None:
+    """OBJ: Drake makes no convex hull of an STL file and refuses the model."""
+    named = re.findall(r"part_\d+\.\w+", (folder / file).read_text())
+    assert named == [f"part_{number}.obj" for number in range(len(model.parts))]
+    parts = [trimesh.load_mesh(folder / name) for name in named]
+    assert all(part.is_watertight and part.is_convex for part in parts)
+    assert sum(part.volume for part in parts) == pytest.approx(VOLUME_m3, rel=1e-3)
 
 
 def test_usd_holds_mass_surface_and_uncertainty(folder: Path, model: SolidModel) -> None:
