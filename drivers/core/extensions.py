@@ -83,7 +83,7 @@ def _import(path: Path, name: str) -> None:
         spec.loader.exec_module(module)
     except BaseException as error:
         unload_extension(path)
-        if isinstance(error, TactileLabError) or not isinstance(error, Exception):
+        if isinstance(error, TactileLabError) or not isinstance(error, Exception | SystemExit):
             raise
         what = f"this extension could not be loaded: {explain(error, str(path))}"
         raise ConfigurationError(what, where=str(path), hint="Correct it, or remove it") from error

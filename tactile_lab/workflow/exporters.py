@@ -34,6 +34,8 @@ def export_as(name: str, session: Session, place: Path) -> str:
     try:
         unfinished.mkdir(parents=True)
         count = export(session, unfinished / place.name)
+        if not (unfinished / place.name).exists():
+            raise SessionError(f"the exporter {name!r} wrote nothing", where=EXPORTERS.file(name), hint="Correct it")
         (unfinished / place.name).rename(place)
     except TactileLabError:
         raise

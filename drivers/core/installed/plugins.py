@@ -77,7 +77,7 @@ class Plugin:
             raise ConfigurationError(f"the plug-in {self.name!r} of {self.origin} {self.obstacle}", where=self.file)
         try:
             return self._point.load()
-        except Exception as error:
+        except (Exception, SystemExit) as error:  # a module may end the program instead of raising
             told = explain(error, self.file)
             what = f"the plug-in {self.name!r} of {self.origin} could not be loaded: {told}"
             raise ConfigurationError(what, where=self.file, hint=hint) from error

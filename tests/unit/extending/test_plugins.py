@@ -74,6 +74,15 @@ def test_one_that_raises_is_named_with_its_file_and_line_and_leaves_the_others(i
     assert "could not be loaded" in problem
 
 
+def test_one_that_ends_the_program_at_import_ends_nothing(install: Install) -> None:
+    file = install("quitting_lab", entry("policies", "mine", "quitting_lab:Mine"), "import sys\nsys.exit(4)\n")
+    answer = CliRunner().invoke(app, ["plugins", "--json"])
+    assert answer.exit_code == 3
+    (told,) = json.loads(answer.stdout)
+    assert told["file"] == str(file)
+    assert "'mine' of quitting_lab 2.0 could not be loaded: SystemExit: 4 (line 2)" in told["problem"]
+
+
 def test_an_object_that_is_not_there(install: Install) -> None:
     install("empty_lab", entry("policies", "mine", "empty_lab:Mine"))
     with pytest.raises(ConfigurationError, match=r"AttributeError.*Mine"):
@@ -181,11 +190,16 @@ class _Recorded:
     """As much of a session as an exporter here looks at."""
 
 
-@pytest.mark.parametrize("text", ["place.write_text('half')\n    1 / 0", "return 3"])
-def test_an_exporter_that_fails_or_writes_nothing_leaves_nothing(install: Install, tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("place.write_text('half')\n    1 / 0", "raises ZeroDivisionError"), ("return 3", "wrote nothing")],
+)
+def test_an_exporter_that_fails_or_writes_nothing_leaves_nothing(
+    install: Install, tmp_path: Path, text: str, words: str
+) -> None:
     install("export_lab", entry("exporters", "mine", "export_lab:mine"), f"def mine(session, place):\n    {text}\n")
     place = tmp_path / "new" / "out.txt"
-    with pytest.raises(SessionError, match="the exporter 'mine' raises"):
+    with pytest.raises(SessionError, match=f"the exporter 'mine' {words}"):
         export_as("mine", _Recorded(), place)  # type: ignore[arg-type]
     assert not any(place.parent.iterdir()) if place.parent.exists() else True
     assert list(EXPORTERS)[-1] == "mine"

@@ -79,6 +79,7 @@ def test_two_extensions_cannot_share_a_name_but_one_may_be_loaded_twice(written:
         ("def broken(:\n", r"SyntaxError"),
         ("import no_such_library\n", r"ModuleNotFoundError: No module named 'no_such_library' \(line 3\)"),
         ("1 / 0\n", r"ZeroDivisionError: division by zero \(line 3\)"),
+        ("raise SystemExit(4)\n", r"SystemExit: 4 \(line 3\)"),
     ],
 )
 def test_an_extension_that_cannot_be_loaded_is_named_and_leaves_nothing(
