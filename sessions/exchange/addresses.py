@@ -58,9 +58,8 @@ def refuse_unwritable_anywhere(path: Path) -> None:
     if (address := address_of(path)) is None:
         refuse_unwritable(path)
         return
-    place = Place(address.rpartition("/")[0])
-    place.write(_PROBE, b"")
-    place.remove([_PROBE])
+    folder, _, name = address.rpartition("/")
+    Place(folder).try_writing(name)
 
 
 class Place:
@@ -107,6 +106,13 @@ class Place:
         with told(f"{self.address}/{name}"):
             self._make_folder(name)
             self._files.pipe_file(self._path(name), content)
+
+    def try_writing(self, name: str) -> None:
+        """Whether one may write a file, by an empty one beside it that is removed again."""
+        with told(f"{self.address}/{name}"):
+            self._make_folder(_PROBE)
+            self._files.pipe_file(self._path(_PROBE), b"")
+        self.remove([_PROBE])
 
     def put(self, name: str, file: Path) -> None:
         """Copy a file of this computer there."""

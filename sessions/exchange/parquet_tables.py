@@ -41,7 +41,8 @@ def write_parquet(tables: SampleTables, folder: Path) -> int:
             _write(partial / f"{name}.parquet", _arrow(table))
         if tables.pictures:
             stamps_ns, encoded = zip(*tables.pictures, strict=True)
-            _write(partial / f"{PICTURES}.parquet", pyarrow.table({"stamp_ns": stamps_ns, "encoded": encoded}))
+            columns = {"stamp_ns": pyarrow.array(stamps_ns, pyarrow.int64()), "encoded": pyarrow.array(encoded)}
+            _write(partial / f"{PICTURES}.parquet", _with_units(columns))
         partial.replace(folder)
     except OSError as error:
         what = f"cannot be written ({error.strerror or error})"
@@ -60,6 +61,10 @@ def _arrow(table: Table) -> pyarrow.Table:
     columns = {"stamp_ns": pyarrow.array(table.stamps_ns, pyarrow.int64())}
     for place, name in enumerate(table.columns):
         columns[name] = pyarrow.array([_plain(row[place]) for row in table.rows])
+    return _with_units(columns)
+
+
+def _with_units(columns: dict[str, pyarrow.Array]) -> pyarrow.Table:
     fields = [
         pyarrow.field(name, values.type, metadata={"unit": unit} if (unit := unit_of(name)) else None)
         for name, values in columns.items()

@@ -169,6 +169,8 @@ def test_a_session_is_exported_in_every_form_and_opens_in_programs_that_are_not_
     assert 4 <= told["lerobot_written"] <= 6  # ten a second
     wrenches = parquet.read_table(tmp_path / "columns" / "wrench_FF.parquet")
     assert wrenches.schema.field("tx_Nm").metadata == {b"unit": b"N m"}
+    for file in (tmp_path / "columns").glob("*.parquet"):
+        assert parquet.read_schema(file).field("stamp_ns").metadata == {b"unit": b"ns"}, file.name
     with (tmp_path / "tables" / "joints.csv").open(newline="") as file:
         lines = sum(1 for _ in csv.DictReader(file))
     with h5py.File(tmp_path / "all.h5") as file:

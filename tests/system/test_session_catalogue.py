@@ -59,6 +59,8 @@ def test_a_catalogue_as_csv_and_json_and_on_the_screen(recorded: Path, tmp_path:
     assert [row["session"] for row in rows] == [line["session"] for line in listed]
     assert rows[0]["grasps"] == str(listed[0]["grasps"])
     assert recorded.name in tactile_lab("session", "catalogue", recorded.parent).stdout
+    elsewhere = tactile_lab("session", "catalogue", recorded.parent, "--out", "memory://tables/all.csv")
+    assert elsewhere.stdout.endswith(": memory://tables/all.csv\n")
 
 
 def test_what_cannot_be_made_is_said_before_anything_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,7 @@ def catalogue(
 
     Exit code 3 if a session cannot be read; it is in the table with its problem.
     """
+    from sessions.exchange.addresses import address_of
     from tactile_lab.cli.console import answer, count, emit_json, show_table, warn
     from tactile_lab.workflow.cataloguing import catalogue, check_table, write_catalogue
 
@@ -34,7 +35,7 @@ def catalogue(
     lines = catalogue(roots or [Path("runs")])
     if out is not None:
         write_catalogue(lines, out)
-        answer(f"{count(len(lines), 'session')}: {out}")
+        answer(f"{count(len(lines), 'session')}: {address_of(out) or out}")
     if as_json:
         emit_json(lines)
     elif out is None:

@@ -86,7 +86,9 @@ def test_a_bucket_that_is_read_only_is_one_sentence(bucket, closed, monkeypatch)
     monkeypatch.setattr(s3fs.S3FileSystem, "_call_s3", denied)
     with pytest.raises(WriteError, match="one may not read or write there with these credentials"):
         write_anywhere(Path(f"{bucket}/all.csv"), "a table")
-    with pytest.raises(WriteError, match="one may not read or write there with these credentials"):
+    with pytest.raises(
+        WriteError, match=r"laboratory/all\.csv: one may not read or write there with these credentials"
+    ):
         refuse_unwritable_anywhere(Path(f"{bucket}/all.csv"))
 
 
