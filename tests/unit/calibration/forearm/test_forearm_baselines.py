@@ -50,11 +50,15 @@ NOON = datetime(2026, 3, 1, 12, tzinfo=UTC)
 
 
 def touched(form: HandForm, seed: int = 3) -> tuple[Touch, ...]:
-    """Touches of every target by two fingers, one of them off by 2 cm."""
+    """Touches of every target by two fingers, one of them off by 2 cm, one of unknown force."""
     rng = np.random.default_rng(seed)
     rig = TrueRig.draw(rng)
     touches = touches_of(plan_touches(GEOMETRY, ("FF", "LF"), 2, form), rig, rng)
     touches[5] = replace(touches[5], point_distal_m=touches[5].point_distal_m + np.array([0.0, 0.02, 0.01]))
+    told = touches[3]
+    touches[3] = Touch(
+        told.finger, told.pose, told.point_distal_m, told.normal_distal, told.point_covariance_m2, told.target
+    )
     return tuple(touches)
 
 

@@ -311,8 +311,13 @@ def test_bytes_that_are_no_status_count_as_lost(rig: Rig, garbage: bytes) -> Non
 
 
 def test_a_sound_positioner_has_nothing_to_report(rig: Rig) -> None:
+    before = rig.device.counters.cycles  # connecting may take an exchange or two
     rig.run(30)
     assert rig.device.health() == ()
+    counters = rig.device.counters
+    assert 0 <= before <= 2
+    assert counters.cycles == before + 30
+    assert (counters.lost, counters.lost_in_a_row, counters.malformed, counters.late) == (0, 0, 0, 0)
 
 
 def test_stop_does_not_raise_before_connecting() -> None:
