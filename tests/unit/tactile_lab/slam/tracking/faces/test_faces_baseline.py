@@ -115,11 +115,8 @@ def test_poses_and_faces_smoothed_together(kind: Kind) -> None:
     assert_baseline(f"tracking/faces/smoothing-{kind}", values, rtol=1e-5, atol=1e-7)
 
 
-@pytest.mark.parametrize("price", [0.3, 2.0, 7.0])
-@pytest.mark.parametrize("kind", ["plane", "table"])
-def test_faces_divided_too_far_are_merged(kind: Kind, price: float) -> None:
-    """Every face with four contacts or more divided in two: which halves are put together again, at three prices."""
-    contact_map = known(kind, 5)
+def divided(contact_map: ContactMap) -> FlatFaces:
+    """Its faces, each with four contacts or more divided in two."""
     faces, _ = flat_faces(contact_map)
     labels, normals, offsets = faces.labels.copy(), list(faces.normals), list(faces.offsets_m)
     for face in range(faces.count):
@@ -128,13 +125,30 @@ def test_faces_divided_too_far_are_merged(kind: Kind, price: float) -> None:
             labels[mine[1::2]] = len(normals)
             normals.append(faces.normals[face])
             offsets.append(faces.offsets_m[face] + 0.0005)
-    halves = FlatFaces(labels, np.array(normals), np.array(offsets), faces.leaning, np.zeros_like(faces.bounded))
+    return FlatFaces(labels, np.array(normals), np.array(offsets), faces.leaning, np.zeros_like(faces.bounded))
 
-    def all_pairs(given: FlatFaces) -> list[tuple[int, int]]:
-        return [(one, other) for other in range(given.count) for one in range(other)]
 
-    found = FacetSmoother(contact_map, NOISE).simplify(contact_map.rows, halves, price, all_pairs)
+def all_pairs(given: FlatFaces) -> list[tuple[int, int]]:
+    return [(one, other) for other in range(given.count) for one in range(other)]
+
+
+@pytest.mark.parametrize("price", [0.3, 2.0, 7.0])
+@pytest.mark.parametrize("kind", ["plane", "table"])
+def test_faces_divided_too_far_are_merged(kind: Kind, price: float) -> None:
+    """Which halves are put together again, at three prices."""
+    contact_map = known(kind, 5)
+    found = FacetSmoother(contact_map, NOISE).simplify(contact_map.rows, divided(contact_map), price, all_pairs)
     assert_baseline(f"tracking/merged-faces/{kind}-{price:g}", fitted(found), rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["plane", "table"])
+def test_what_a_merger_is_expected_to_cost(kind: Kind) -> None:
+    """Each pair of halves and of faces that are nearly flat, after one step of the optimiser."""
+    contact_map = known(kind, 5)
+    smoother = FacetSmoother(contact_map, NOISE)
+    at = smoother.fit(contact_map.rows, divided(contact_map), 1)
+    costs = smoother._merger_costs(at, all_pairs(at.faces))
+    assert_baseline(f"tracking/merged-faces/expected-{kind}", {str(each): costs[each] for each in costs}, rtol=1e-4)
 
 
 @pytest.mark.parametrize("kind", KINDS)
