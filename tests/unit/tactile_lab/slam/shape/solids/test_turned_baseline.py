@@ -123,8 +123,10 @@ def profiles() -> dict[str, Turned]:
     """Axis and kernel given: walls that narrow, that are upright, touched from high up only, and that widen upward."""
     found = {}
     for name, slope in (("narrow", 0.15), ("upright", 0.0), ("high", 0.0), ("wide", -0.25)):
-        lowest_m = 0.045 if name == "high" else 0.0
-        field = field_of(*shaken(*around_cone(30, slope=slope, lowest_m=lowest_m)))
+        points_m, normals = around_cone(30, slope=slope, lowest_m=0.045 if name == "high" else 0.0)
+        if name == "high":  # as a cup that was touched low down only inside
+            points_m[:3], normals[:3] = points_m[:3] * [0.6, 0.6, 0.2], -normals[:3]
+        field = field_of(*shaken(points_m, normals))
         contacts = weighted(field.contacts_m, field.normals)
         within, _ = split(contacts, AXIS_m)
         within /= np.linalg.norm(within, axis=1, keepdims=True)
