@@ -129,7 +129,7 @@ def test_regularities_of_directions() -> None:
                 turn = np.deg2rad(1.9 * step + 0.4)
                 turned = np.array([np.sin(turn), np.cos(turn), 0.05 * step])[:dimension]
                 normals = np.vstack([np.eye(dimension), turned / np.linalg.norm(turned), -np.eye(dimension)[:1]])
-                spread = sigma**2 * np.diag(1.0 + 0.1 * np.arange(normals.size))
+                spread = sigma**2 * np.diag(1.0 + 0.3 * np.sqrt(np.arange(normals.size)))
                 found = regular_normals(normals, spread, upright=dimension == 3)
                 said = " ".join(f"{each.kind} {each.face} {each.other}," for each in found.regularities)
                 rows.append([found.normals[-2], 1e3 * np.diag(found.covariance), said, found.saved])
