@@ -56,6 +56,7 @@ def test_standing_fields() -> None:
         "few": around_tin(tops=2),
         "three": around_tin(tops=3),
         "no top": around_tin(tops=0),
+        "no top, low": around_tin(tops=0, lowest_m=0.004),
         "wavy": around_tin(waves_m=0.003),
         "uneven": around_tin(waves_m=0.02, tops=6),
     }
