@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from pydantic import Field
 
 from calibration.camera.views import BoardView, Coverage, coverage
-from drivers.camera.board_pose import board_pose
 from drivers.camera.calibration import CameraCalibration
+from drivers.camera.opencv import cv2
+from drivers.camera.pose.board_pose import board_pose
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import cv2
 import numpy as np
 
-from drivers.camera.board_pose import board_pose
 from drivers.camera.boards import AnyBoard
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.frames import Image
+from drivers.camera.opencv import cv2
+from drivers.camera.pose.board_pose import board_pose
 from drivers.core.contacts import Array
 
 LEAST_CORNERS = 8

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import cv2
 import gtsam
 import numpy as np
 from gtsam import Pose3
@@ -34,10 +33,11 @@ from calibration.steps.refinement import (
     prior_of_offsets,
     variance_factor,
 )
-from drivers.camera.board_pose import board_pose
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.glass import Glass
-from drivers.camera.markers import MarkerSettings, marker_poses
+from drivers.camera.markers import MarkerSettings
+from drivers.camera.pose.board_pose import board_pose
+from drivers.camera.pose.square_pose import marker_poses
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import rotate, rotation_angle_rad, transform_points
@@ -169,10 +169,10 @@ class BoardProblem:
 
         def evaluate(values: gtsam.Values) -> tuple[Array, list[Array]]:
             camera: Pose3 = values.atPose3(CAMERA)
-            seen, slopes = self._project(transform_points(camera.inverse(), points))
+            seen, slopes = self._camera.projection(transform_points(camera.inverse(), points))
             return (seen - self._world_px).ravel(), [_rows(slopes @ by_camera(camera, points))]
 
-        _, slopes = self._project(transform_points(camera.inverse(), points))
+        _, slopes = self._camera.projection(transform_points(camera.inverse(), points))
         larger = rotate(camera.inverse(), points - points.mean(axis=0))
         size = self.noise.print_share * np.einsum("nij,nj->ni", slopes, larger).ravel()
         alike = self.noise.corner_bias_px * np.tile(np.eye(2), (len(points), 1))
@@ -188,7 +188,7 @@ class BoardProblem:
         def evaluate(values: gtsam.Values) -> tuple[Array, list[Array]]:
             places = chain.world_m(values) + shift
             camera: Pose3 = values.atPose3(CAMERA)
-            seen, slopes = self._project(transform_points(camera.inverse(), places))
+            seen, slopes = self._camera.projection(transform_points(camera.inverse(), places))
             turned = camera.rotation().matrix().T
             by_mount, by_board, by_offset = (turned @ part for part in chain.derivatives(values))
             parts = (by_mount, by_board, by_camera(camera, places), by_offset)
@@ -204,13 +204,6 @@ class BoardProblem:
         places = chain.world_m(values)
         return self._glass.apparent(places, np.asarray(values.atPose3(CAMERA).translation())) - places
 
-    def _project(self, points_camera_m: Array) -> tuple[Array, Array]:
-        """Pixels (n, 2) and their derivatives by the points, (n, 2, 3)."""
-        pixels, jacobian = cv2.projectPoints(
-            points_camera_m, np.zeros(3), np.zeros(3), self._camera.matrix, self._camera.distortion_coefficients
-        )
-        return np.asarray(pixels[:, 0], float), np.asarray(jacobian[:, 3:6], float).reshape(-1, 2, 3)
-
     # --- residuals ---------------------------------------------------------------------------------------------
 
     def residuals(self, solution: Solution) -> tuple[PoseResidual, ...]:
@@ -223,7 +216,7 @@ class BoardProblem:
         chain = BoardChain(link_motion(view.pose, self._link, self.joints, offsets), None, view.board_m)
         places = chain.world_m(values) + self._glass_shift(chain, values)
         camera: Pose3 = values.atPose3(CAMERA)
-        expected_px, _ = self._project(transform_points(camera.inverse(), places))
+        expected_px, _ = self._camera.projection(transform_points(camera.inverse(), places))
         off = self._camera_T_board(replace(view, board_px=expected_px)).between(self._camera_T_board(view))
         pixels = float(np.sqrt(np.mean(np.sum((expected_px - view.board_px) ** 2, axis=1))))
         return PoseResidual(

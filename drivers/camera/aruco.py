@@ -17,16 +17,11 @@ import numpy as np
 from gtsam import Pose3, Rot3
 
 from drivers.camera.calibration import CameraCalibration
+from drivers.camera.detection import detection
 from drivers.camera.frames import Detection, Frame
-from drivers.camera.joint_pose import Corners, JointPose, solve_jointly
-from drivers.camera.markers import (
-    MarkerPose,
-    MarkerSettings,
-    detection,
-    marker_poses,
-    points_reprojection_px,
-    refine_pose,
-)
+from drivers.camera.markers import MarkerSettings
+from drivers.camera.pose.joint_pose import Corners, JointPose, solve_jointly
+from drivers.camera.pose.square_pose import MarkerPose, marker_poses, points_reprojection_px, refine_pose
 from drivers.camera.world_marker import WorldMarker, table_glass
 from drivers.core.contacts import Array
 from drivers.core.poses import rotate, transform_points
@@ -228,9 +223,7 @@ def detection_in(frame: Frame, dictionary: str) -> Detection:
     """The markers found when the frame was taken; otherwise those detected in its picture now."""
     if frame.detection is not None:
         return frame.detection
-    if frame.image is None:
-        return Detection(dictionary, (0, 0), {})
-    return detection(frame.image, dictionary)
+    return Detection(dictionary, (0, 0), {}) if frame.image is None else detection(frame.image, dictionary)
 
 
 def fit_in_plane(model: Array, seen: Array) -> tuple[Array, float, float]:

@@ -11,12 +11,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
-import cv2
 import numpy as np
 from pydantic import Field, RootModel, model_validator
 
+from drivers.camera.detection import detect
 from drivers.camera.frames import Image
-from drivers.camera.markers import detect
+from drivers.camera.opencv import cv2
 from drivers.camera.targets.april_grid import AprilGrid
 from drivers.camera.targets.chessboard import Chessboard
 from drivers.camera.targets.kalibr_target import board_of_kalibr

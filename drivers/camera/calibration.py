@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-import cv2
 import numpy as np
 from pydantic import Field, field_validator
 
+from drivers.camera.distortion import Distortion
 from drivers.core.calibration_file import load_parameters
-from drivers.core.configuration import StrictModel, validate
+from drivers.core.configuration import StrictModel, loads, validate
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.core.reading.bounded_files import open_plain
+from drivers.core.reading.bounded_files import LARGEST_YAML_bytes, open_plain, read_bounded
 
 _DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
-_UNDISTORTION = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 40, 1e-9)
-"""OpenCV's default of five iterations leaves an error of half a pixel at the edge of a wide picture."""
+_OPENCV_HEAD, _OPENCV_MATRIX = b"%YAML:1.0", b"!!opencv-matrix"
 
 
 class CameraCalibration(StrictModel):
@@ -63,31 +64,32 @@ class CameraCalibration(StrictModel):
 
     def rays(self, pixels: Array) -> Array:
         """Directions of pixels (n, 2) without distortion: shape (n, 3), camera frame, z = 1."""
-        points = cv2.undistortPointsIter(
-            np.asarray(pixels, float).reshape(-1, 1, 2),
-            self.matrix,
-            self.distortion_coefficients,
-            np.eye(3),
-            np.eye(3),
-            _UNDISTORTION,
-        )
-        return np.hstack([np.asarray(points, float)[:, 0], np.ones((len(points), 1))])
+        pixels = np.asarray(pixels, float).reshape(-1, 2)
+        points = self._bending.undistorted(pixels, np.array(self.focal_px), np.array(self.centre_px))
+        return np.hstack([points, np.ones((len(points), 1))])
 
     def project(self, points_camera_m: Array) -> Array:
         """Pixels (n, 2) of points (n, 3) in the camera frame."""
-        pixels, _ = cv2.projectPoints(
-            points_camera_m, np.zeros(3), np.zeros(3), self.matrix, self.distortion_coefficients
-        )
-        return np.asarray(pixels[:, 0], float)
+        return np.asarray(self._bending.distorted(_at_one(points_camera_m)) * self.focal_px + self.centre_px)
 
     def projection(self, points_camera_m: Array) -> tuple[Array, Array]:
         """Pixels (n, 2) of points (n, 3) in the camera frame, and their derivatives with respect to the points (n, 2,
         3).
         """
-        pixels, slopes = cv2.projectPoints(
-            points_camera_m, np.zeros(3), np.zeros(3), self.matrix, self.distortion_coefficients
-        )
-        return np.asarray(pixels[:, 0], float), np.asarray(slopes, float)[:, 3:6].reshape(-1, 2, 3)
+        points = _at_one(points_camera_m)
+        by_point = self._bending.slopes(points) * np.array(self.focal_px)[:, None]
+        by_depth = -by_point @ points[:, :, None]
+        by_place = np.concatenate([by_point, by_depth], axis=2) / points_camera_m[:, 2, None, None]
+        return np.asarray(self._bending.distorted(points) * self.focal_px + self.centre_px), by_place
+
+    @cached_property
+    def _bending(self) -> Distortion:
+        return Distortion(self.distortion)
+
+
+def _at_one(points_camera_m: Array) -> Array:
+    """Where the rays to points (n, 3) are at a distance of one, shape (n, 2)."""
+    return np.asarray(points_camera_m[:, :2] / points_camera_m[:, 2:])
 
 
 def load_camera(path: Path) -> CameraCalibration:
@@ -103,24 +105,41 @@ def is_opencv(path: Path) -> bool:
     """Whether a file has OpenCV's header; such a file does not name its camera. Raises ConfigurationError."""
     try:
         with open_plain(path) as file:
-            return file.read(9) == b"%YAML:1.0"
+            return file.read(len(_OPENCV_HEAD)) == _OPENCV_HEAD
     except OSError as error:
         raise ConfigurationError(f"cannot be read ({error.strerror})", where=str(path)) from error
 
 
 def _opencv(path: Path) -> CameraCalibration:
-    try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
-        matrix, distortion = storage.getNode("camera_matrix").mat(), storage.getNode("distortion_coefficients").mat()
-        size = [int(storage.getNode(name).real()) for name in ("image_width", "image_height")]
-    except (cv2.error, SystemError) as error:
-        raise ConfigurationError("is not an OpenCV file", where=str(path)) from error
+    """OpenCV's files are YAML but for their first line and the tags of their matrices."""
+    text = read_bounded(path, LARGEST_YAML_bytes).partition(b"\n")[2].replace(_OPENCV_MATRIX, b"")
+    found = loads(text, str(path))
+    names = ("camera_matrix", "distortion_coefficients")
+    matrix, distortion = (_matrix(found, name) for name in names)
     if matrix is None or distortion is None or matrix.shape != (3, 3):
-        raise ConfigurationError("has no camera_matrix and distortion_coefficients", where=str(path))
+        raise ConfigurationError(f"has no {' and '.join(names)}", where=str(path))
     content = {
         "focal_px": (float(matrix[0, 0]), float(matrix[1, 1])),
         "centre_px": (float(matrix[0, 2]), float(matrix[1, 2])),
         "distortion": tuple(float(value) for value in distortion.ravel()),
-        "size_px": tuple(size) if min(size) > 0 else None,
+        "size_px": _size(found),
     }
     return validate(content, CameraCalibration, where=str(path))
+
+
+def _matrix(found: Any, name: str) -> Array | None:
+    """A matrix of an OpenCV file; None where it has none of this name."""
+    try:
+        matrix = found[name]
+        return np.array(matrix["data"], float).reshape(matrix["rows"], matrix["cols"])
+    except (KeyError, TypeError, ValueError, OverflowError):
+        return None
+
+
+def _size(found: dict[str, Any]) -> tuple[int, int] | None:
+    """The pictures' size in an OpenCV file; None where it does not say."""
+    match [found.get(name) for name in ("image_width", "image_height")]:
+        case [int(width), int(height)] if min(width, height) > 0:
+            return width, height
+        case _:
+            return None

@@ -63,14 +63,14 @@ class Camera:
 
         Raises:
             DeviceError: no picture was requested, none came within the time-out, or the transport failed.
-            CodecError: the picture cannot be decoded.
+            CodecError: what arrived is no picture.
         """
         if self._asked_ns is None:
             raise DeviceError("no picture was requested", where=self._transport.name, hint="Request one first")
         self.poll()
         arrived, self._arrived = self._arrived, []
         frames = [self.receive(datagram) for datagram in arrived]
-        frame = next((frame for frame in reversed(frames) if frame.image is not None), None)
+        frame = next((frame for frame in reversed(frames) if frame.picture is not None), None)
         if frame is None and self._clock.now_ns() - self._asked_ns >= 1e6 * self._settings.timeout_ms:
             raise DeviceError(
                 f"no picture within {self._settings.timeout_ms:.0f} ms",

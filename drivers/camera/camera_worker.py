@@ -12,10 +12,9 @@ import select
 import sys
 from typing import Any
 
-import cv2
-
+from drivers.camera.detection import detection
 from drivers.camera.frames import Frame
-from drivers.camera.markers import detection
+from drivers.camera.opencv import cv2
 from drivers.camera.packet import encode_packet
 from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import CameraSourceSettings

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.frames import Image, SeenMarker
+from drivers.camera.opencv import cv2
 from drivers.camera.profiles import Profiles, fit_profiles
 from drivers.core.contacts import Array
 

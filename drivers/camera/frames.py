@@ -1,15 +1,16 @@
-"""Frames of a camera; encoded pictures (JPEG, PNG) to images, checked before the decoder sees them."""
+"""Frames of a camera; encoded pictures (JPEG, PNG), checked as they arrive and decoded where somebody looks at them."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.camera.opencv import cv2
 from drivers.core.contacts import Array
 from drivers.core.errors import CodecError
 
@@ -17,7 +18,7 @@ Image = NDArray[np.uint8]
 LARGEST_PIXELS = 40_000_000
 """A header that states more is damaged or malicious."""
 
-_PNG_HEAD, _PNG_TAIL = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB\x60\x82"
+PNG_HEAD, _PNG_TAIL = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB\x60\x82"
 _CHUNK_FRAME = 12  # bytes of a PNG chunk in addition to its data: length, type, checksum
 _JPEG_HEAD, _JPEG_TAIL = b"\xff\xd8", b"\xff\xd9"
 _JPEG_SIZES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
@@ -57,17 +58,28 @@ class Frame:
 
     Attributes:
         stamp_ns: arrival at the host.
-        image: grey levels, shape (height, width), uint8; None if only the corners were kept.
+        picture: grey levels, shape (height, width), uint8, or as the camera encoded them; None if only the corners were
+            kept.
         counter: number of the frame since the camera was opened.
         dropped: frames since it was opened that the camera took but the program did not receive.
         detection: the markers found when the frame arrived; None if they were not searched for.
     """
 
     stamp_ns: int
-    image: Image | None
+    picture: Image | bytes | None
     counter: int = 0
     dropped: int = 0
     detection: Detection | None = None
+
+    @cached_property
+    def image(self) -> Image | None:
+        """Grey levels, shape (height, width), uint8; None if only the corners were kept.
+
+        Raises:
+            CodecError: the encoded picture is damaged.
+            ConfigurationError: it is encoded, and what decodes it is not installed.
+        """
+        return decode_image(self.picture) if isinstance(self.picture, bytes) else self.picture
 
 
 def decode_image(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> Image:
@@ -76,9 +88,7 @@ def decode_image(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> Ima
     Raises:
         CodecError: neither format, truncated, damaged, or with more pixels than ``largest_pixels``.
     """
-    width, height = _size(payload)
-    if not 0 < width * height <= largest_pixels:
-        raise _error(f"a picture of {width} x {height} pixels")
+    picture_size(payload, largest_pixels=largest_pixels)
     try:
         image = cv2.imdecode(np.frombuffer(payload, np.uint8), cv2.IMREAD_GRAYSCALE)
     except cv2.error as error:
@@ -88,9 +98,20 @@ def decode_image(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> Ima
     return np.asarray(image, np.uint8)
 
 
-def _size(payload: bytes) -> tuple[int, int]:
-    """Width and height that the header states. Raises CodecError for bytes that are not a picture or lack its end."""
-    if payload.startswith(_PNG_HEAD):
+def picture_size(payload: bytes, *, largest_pixels: int = LARGEST_PIXELS) -> tuple[int, int]:
+    """Width and height of a JPEG or PNG by its header; nothing is decoded.
+
+    Raises:
+        CodecError: neither format, truncated, or with more pixels than ``largest_pixels``.
+    """
+    width, height = _stated_size(payload)
+    if not 0 < width * height <= largest_pixels:
+        raise _error(f"a picture of {width} x {height} pixels")
+    return width, height
+
+
+def _stated_size(payload: bytes) -> tuple[int, int]:
+    if payload.startswith(PNG_HEAD):
         if not payload.endswith(_PNG_TAIL) or len(payload) < 33:
             raise _error("PNG truncated")
         _check_chunks(payload)
@@ -105,7 +126,7 @@ def _size(payload: bytes) -> tuple[int, int]:
 
 def _check_chunks(payload: bytes) -> None:
     """Refuse a PNG whose chunks do not end where its data end: OpenCV allocates whatever length they state."""
-    at = len(_PNG_HEAD)
+    at = len(PNG_HEAD)
     while at + _CHUNK_FRAME <= len(payload):
         (length,) = struct.unpack_from(">I", payload, at)
         at += _CHUNK_FRAME + length

@@ -17,13 +17,14 @@ import struct
 
 import numpy as np
 
-from drivers.camera.frames import LARGEST_PIXELS, Detection, Frame, SeenMarker, decode_image
+from drivers.camera.frames import LARGEST_PIXELS, Detection, Frame, SeenMarker, picture_size
 from drivers.camera.markers import DICTIONARIES
 from drivers.core.errors import CodecError
 from drivers.core.transports import Datagram
 
 MAGIC, VERSION = b"TLCP", 1
 _HEAD = struct.Struct("<4sBBHHHIII")
+_FARTHEST_px = 1e6
 _COUNTER = 5  # index among the numbers of the header
 _MARKER = np.dtype([("number", "<u2"), ("blur_px", "<f4"), ("corners_px", "<f4", (4, 2))])
 
@@ -48,7 +49,7 @@ def encode_packet(frame: Frame, picture: bytes = b"") -> bytes:
 
 
 def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -> Frame:
-    """Decode a frame from what a camera sent.
+    """Decode a frame from what a camera sent. Its picture stays encoded until somebody looks at it.
 
     Raises:
         CodecError: the bytes are neither a packet nor a picture, are damaged, or hold a picture of more than
@@ -56,7 +57,8 @@ def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -
     """
     payload = datagram.payload
     if not payload.startswith(MAGIC):
-        return Frame(datagram.stamp_ns, decode_image(payload, largest_pixels=largest_pixels))
+        picture_size(payload, largest_pixels=largest_pixels)
+        return Frame(datagram.stamp_ns, payload)
     version, dictionary, width, height, markers, counter, dropped, picture = _head(payload)
     if version != VERSION or dictionary >= len(DICTIONARIES):
         raise _error(f"a packet of version {version}, dictionary {dictionary}")
@@ -64,14 +66,16 @@ def decode_packet(datagram: Datagram, *, largest_pixels: int = LARGEST_PIXELS) -
     if len(payload) != rows_end + picture:
         raise _error(f"{len(payload)} bytes instead of {rows_end + picture}")
     rows = np.frombuffer(payload, _MARKER, markers, _HEAD.size)
-    if not (np.isfinite(rows["corners_px"]).all() and (rows["blur_px"] >= 0.0).all()):
-        raise _error("corners that are not numbers")
+    if not ((np.abs(rows["corners_px"]) < _FARTHEST_px).all() and (rows["blur_px"] >= 0.0).all()):
+        raise _error("corners that are no places in a picture")
     found = Detection(DICTIONARIES[dictionary], (width, height), {int(row["number"]): _marker(row) for row in rows})
-    promised = min(largest_pixels, width * height)  # a picture whose header states a larger size is not decoded at all
-    image = decode_image(payload[rows_end:], largest_pixels=promised) if picture else None
-    if image is not None and image.shape != (height, width):
-        raise _error(f"a picture of {image.shape[1]} x {image.shape[0]} pixels instead of {width} x {height}")
-    return Frame(datagram.stamp_ns, image, counter, dropped, found)
+    if not picture:
+        return Frame(datagram.stamp_ns, None, counter, dropped, found)
+    encoded = payload[rows_end:]
+    across, down = picture_size(encoded, largest_pixels=largest_pixels)
+    if (across, down) != (width, height):
+        raise _error(f"a picture of {across} x {down} pixels instead of {width} x {height}")
+    return Frame(datagram.stamp_ns, encoded, counter, dropped, found)
 
 
 def picture_of(payload: bytes) -> bytes:

@@ -11,10 +11,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from drivers.camera.frames import Image
+from drivers.camera.opencv import cv2
 from drivers.camera.pictures import Picture, Source
 from drivers.camera.source_settings import PICTURES, CameraSourceSettings
 from drivers.core.clock import NANOSECONDS, Clock
@@ -31,13 +31,11 @@ class OpenCvSource:
     Args:
         settings: which source, and how to read it.
         clock: for the stamps.
-        capture: creates OpenCV's capture object from a name and a back end.
+        capture: creates OpenCV's capture object from a name and a back end; None for its own.
     """
 
-    def __init__(
-        self, settings: CameraSourceSettings, clock: Clock, capture: Callable[..., Any] = cv2.VideoCapture
-    ) -> None:
-        self._settings, self._clock, self._make = settings, clock, capture
+    def __init__(self, settings: CameraSourceSettings, clock: Clock, capture: Callable[..., Any] | None = None) -> None:
+        self._settings, self._clock, self._make = settings, clock, capture or cv2.VideoCapture
         self._capture: Any = None
         self._notes: list[str] = []
         self._size: tuple[int, ...] | None = None

@@ -9,7 +9,8 @@ from gtsam import Pose3
 
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.glass import Glass
-from drivers.camera.markers import MarkerSettings, marker_poses, points_reprojection_px, refine_pose
+from drivers.camera.markers import MarkerSettings
+from drivers.camera.pose.square_pose import marker_poses, points_reprojection_px, refine_pose
 from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 

@@ -276,7 +276,7 @@ class OperatorConsole:
             return
         self._photos += 1
         try:
-            name = self._attachments.picture(f"photo-{self._photos:03d}.png", self._runtime.picture().image)
+            name = self._attachments.picture(f"photo-{self._photos:03d}", self._runtime.picture().picture)
         except TactileLabError as error:
             self.tell(str(error), Level.WARNING)
         else:

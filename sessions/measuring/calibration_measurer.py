@@ -18,7 +18,8 @@ from calibration.forearm.view_plan import PlannedView
 from calibration.forearm.wizard import Observation, Planned
 from calibration.steps.observations import HandPose, Touch, View
 from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker
-from drivers.camera.markers import MarkerSettings, detect
+from drivers.camera.detection import detect
+from drivers.camera.markers import MarkerSettings
 from drivers.camera.targets.april_grid import AprilGrid
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array

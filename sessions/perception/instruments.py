@@ -61,7 +61,12 @@ class FrameReading(Protocol):
     @property
     def stamp_ns(self) -> int: ...
     @property
-    def image(self) -> Any: ...
+    def picture(self) -> Any:
+        """As the camera encoded it."""
+
+    @property
+    def image(self) -> Any:
+        """Its grey levels."""
 
 
 class Decoder(Protocol[Sample_co]):

@@ -6,10 +6,8 @@ import os
 import shutil
 import stat
 from pathlib import Path
-from typing import Any
 
-import cv2
-
+from drivers.camera.frames import PNG_HEAD
 from drivers.core.errors import SessionError
 
 FOLDER, NOTES = "attachments", "notes.txt"
@@ -39,12 +37,10 @@ class Attachments:
         except OSError as error:
             raise SessionError(f"the note cannot be stored ({error.strerror})", where=str(self.folder)) from error
 
-    def picture(self, name: str, image: Any) -> str:
-        """Store a picture (rows, columns[, 3], uint8) as PNG. Returns its name. Raises SessionError."""
-        encoded, data = cv2.imencode(".png", image)
-        if not encoded:
-            raise SessionError("the picture cannot be encoded", where=name)
-        self._write(name, data.tobytes())
+    def picture(self, stem: str, encoded: bytes) -> str:
+        """Store a picture as the camera encoded it, JPEG or PNG. Returns its file's name. Raises SessionError."""
+        name = stem + (".png" if encoded.startswith(PNG_HEAD) else ".jpg")
+        self._write(name, encoded)
         return name
 
     def file(self, source: str) -> str:

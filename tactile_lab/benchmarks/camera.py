@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from drivers.camera.camera_process import CameraProcess
+from drivers.camera.detection import detection
 from drivers.camera.frames import Frame
-from drivers.camera.markers import detection
+from drivers.camera.opencv import cv2
 from drivers.camera.packet import encode_packet
 from drivers.camera.rendering.board_camera import table_pictures
 from drivers.camera.source_settings import CameraSourceSettings

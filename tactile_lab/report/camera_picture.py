@@ -5,14 +5,13 @@ from __future__ import annotations
 import base64
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from gtsam import Pose3
 
 from drivers.camera.calibration import CameraCalibration, load_camera
-from drivers.camera.frames import Image
+from drivers.camera.frames import PNG_HEAD, picture_size
 from drivers.camera.markers import MarkerSettings
-from drivers.camera.packet import decode_packet
+from drivers.camera.packet import picture_of
 from drivers.camera.world_marker import table_glass
 from drivers.core.configuration import validate
 from drivers.core.contacts import Array
@@ -26,7 +25,6 @@ from tactile_lab.report.svg import Chart, Frame
 from tactile_lab.rigs.description import OTHER_VERSION
 
 _CAMERA = "camera"
-_LARGEST_px, _QUALITY = 960, 82
 _NEAREST_m = 0.01
 _CARD_px = 460
 """Width at which the picture is shown; lines and dots are scaled so that they look alike in pictures of any size."""
@@ -38,13 +36,13 @@ class CameraView:
 
     Attributes:
         grasp: number of the grasp that it shows, from 0.
-        image: shape (height, width), grey.
+        picture: as the camera encoded it, JPEG or PNG.
         lens, markers: the session's calibration.
         camera_T_world: by the world marker.
     """
 
     grasp: int
-    image: Image
+    picture: bytes
     lens: CameraCalibration
     markers: MarkerSettings
     camera_T_world: Pose3
@@ -82,9 +80,10 @@ def _last_view(session: Session, world_T_object: Poses) -> tuple[CameraView | No
     pictures = marked_pictures(picture_messages(session))
     for grasp in sorted(pictures, reverse=True):
         if grasp < len(world_T_object) and world_T_object[grasp] is not None:
-            image = decode_packet(pictures[grasp]).image
-            if image is not None:
-                return CameraView(grasp, image, lens, markers, camera_T_world), ""
+            picture = picture_of(pictures[grasp].payload)
+            if picture:
+                picture_size(picture)
+                return CameraView(grasp, picture, lens, markers, camera_T_world), ""
     return None, "no picture of a grasp with an estimated pose was recorded"
 
 
@@ -96,10 +95,13 @@ def draw_on_picture(
     """
     drawn = [(kind, pixels) for kind, points in outlines if (pixels := view.pixels(points)) is not None]
     dots = view.pixels(contacts_world_m) if len(contacts_world_m) else None
-    (left, top), (right, bottom) = _around([pixels for _, pixels in drawn], view.image)
+    size_px = picture_size(view.picture)
+    (left, top), (right, bottom) = _around([pixels for _, pixels in drawn], size_px)
     width, height = right - left, bottom - top
     chart = Chart(Frame(float(width), float(height), 0, 0, 0, 0), (left, right), (bottom, top))
-    chart.add(f'<image href="{_data_uri(view.image[top:bottom, left:right])}" width="{width}" height="{height}"/>')
+    part = f'<svg viewBox="{left} {top} {width} {height}" width="{width}" height="{height}" style="overflow:hidden">'
+    whole = f'<image href="{_data_uri(view.picture)}" width="{size_px[0]}" height="{size_px[1]}"/>'
+    chart.add(f"{part}{whole}</svg>")
     scale = width / _CARD_px
     for kind, pixels in drawn:
         for part, width_px in (("casing", 4.4), (kind, 2.2)):  # legible on light and on dark
@@ -109,9 +111,9 @@ def draw_on_picture(
     return chart.text("The camera's picture", description)
 
 
-def _around(drawn: list[Array], image: Image) -> tuple[tuple[int, int], tuple[int, int]]:
+def _around(drawn: list[Array], size_px: tuple[int, int]) -> tuple[tuple[int, int], tuple[int, int]]:
     """Left upper and right lower corner of the part of a picture to show: what is drawn and as much again around it."""
-    height, width = image.shape
+    width, height = size_px
     inside = [pixels for pixels in drawn if ((pixels >= 0) & (pixels < [width, height])).all(axis=1).any()]
     if not inside:
         return (0, 0), (width, height)
@@ -122,8 +124,6 @@ def _around(drawn: list[Array], image: Image) -> tuple[tuple[int, int], tuple[in
     return (int(low[0]), int(low[1])), (int(high[0]), int(high[1]))
 
 
-def _data_uri(image: Image) -> str:
-    shrink = min(1.0, _LARGEST_px / max(image.shape))
-    small = image if shrink == 1.0 else cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-    _, encoded = cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
-    return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode("ascii")
+def _data_uri(picture: bytes) -> str:
+    kind = "png" if picture.startswith(PNG_HEAD) else "jpeg"
+    return f"data:image/{kind};base64," + base64.b64encode(picture).decode("ascii")

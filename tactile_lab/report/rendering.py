@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
+import struct
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +16,7 @@ from drivers.core.contacts import Array
 SUPERSAMPLING = 2
 _LIGHT = np.array([-0.35, 0.55, 0.76])
 _AMBIENT = 0.45
+_PNG_UP, _PNG_RGBA = 2, 6
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,7 @@ VIEWS = (
 def render(
     vertices_m: Array, faces: NDArray[np.int64], vertex_rgb: NDArray[np.uint8], view: View, size_px: int
 ) -> NDArray[np.uint8]:
-    """A picture of shape (size, size, 4), blue green red alpha, transparent outside the mesh.
+    """A picture of shape (size, size, 4), red green blue alpha, transparent outside the mesh.
 
     Faces are painted from the far to the near ones (orthographic view), each with its mean colour under one
     soft light; the picture is drawn larger and averaged down.
@@ -57,32 +59,76 @@ def render(
     front = np.flatnonzero(normals[:, 2] > 0)
     order = front[np.argsort(corners[front, :, 2].mean(axis=1), kind="stable")]
     shade = _AMBIENT + (1 - _AMBIENT) * np.clip(normals[order] @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
-    colours = vertex_rgb[faces[order]].astype(float).mean(axis=1)[:, ::-1] * shade[:, None]
+    colours = vertex_rgb[faces[order]].astype(float).mean(axis=1) * shade[:, None]
     return _paint(pixels[faces[order]], colours, canvas, size_px)
 
 
-def _paint(triangles_px: Array, colours_bgr: Array, canvas: int, size_px: int) -> NDArray[np.uint8]:
-    picture = np.zeros((canvas, canvas, 4), np.uint8)
-    fractional_bits = 4
-    corners = np.rint(triangles_px * 2**fractional_bits).astype(np.int32)
-    for triangle, colour in zip(corners, colours_bgr, strict=True):
-        cv2.fillConvexPoly(picture, triangle, (*colour.tolist(), 255.0), cv2.LINE_8, fractional_bits)
-    return _shrink(picture, size_px)
+def _paint(triangles_px: Array, colours: Array, canvas: int, size_px: int) -> NDArray[np.uint8]:
+    """Triangles of shape (n, 3, 2) in colours of shape (n, 3), each over those before it."""
+    picture = np.zeros((canvas * canvas, 4), np.uint8)
+    triangle, row, left, count = _spans(triangles_px, canvas)
+    run_start = row * canvas + left - (np.cumsum(count) - count)
+    pixels = np.repeat(run_start, count) + np.arange(count.sum())
+    opaque = np.column_stack([np.rint(colours), np.full(len(colours), 255.0)]).astype(np.uint8)
+    picture[pixels] = np.repeat(opaque[triangle], count, axis=0)
+    return _shrink(picture.reshape(canvas, canvas, 4), size_px)
+
+
+def _spans(
+    triangles_px: Array, canvas: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """The runs of pixels whose middles lie in a triangle: its index, row, first column and length, shape (m,) each."""
+    y = triangles_px[:, :, 1]
+    first, last = _pixels_between(y.min(axis=1), y.max(axis=1), canvas)
+    rows = np.maximum(last - first + 1, 0)
+    triangle = np.repeat(np.arange(len(rows)), rows)
+    row = np.repeat(first - (np.cumsum(rows) - rows), rows) + np.arange(rows.sum())
+    left, right = _pixels_between(*_widths(triangles_px[triangle], row + 0.5), canvas)
+    return triangle, row, left, np.maximum(right - left + 1, 0)
+
+
+def _widths(triangles_px: Array, y: Array) -> tuple[Array, Array]:
+    """Where each of triangles (m, 3, 2) begins and ends along a line of its own y, shape (m,)."""
+    begin, end = triangles_px, np.roll(triangles_px, -1, axis=1)
+    over, under = begin[:, :, 1] - y[:, None], end[:, :, 1] - y[:, None]
+    crossed = (np.minimum(over, under) <= 0.0) & (np.maximum(over, under) >= 0.0) & (over != under)
+    share = over / np.where(crossed, over - under, 1.0)
+    x = begin[:, :, 0] + share * (end[:, :, 0] - begin[:, :, 0])
+    return np.where(crossed, x, np.inf).min(axis=1), np.where(crossed, x, -np.inf).max(axis=1)
+
+
+def _pixels_between(low: Array, high: Array, canvas: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The first and the last pixel whose middle lies between two places."""
+    first, last = np.ceil(low - 0.5), np.floor(high - 0.5)
+    return np.clip(first, 0, canvas).astype(np.intp), np.clip(last, -1, canvas - 1).astype(np.intp)
 
 
 def _shrink(picture: NDArray[np.uint8], size_px: int) -> NDArray[np.uint8]:
     """Average pixels with colours weighted by their cover, so that edges do not darken."""
     alpha = picture[..., 3:].astype(np.float32) / 255.0
     weighted = np.concatenate([picture[..., :3] * alpha, alpha], axis=2)
-    small = cv2.resize(weighted, (size_px, size_px), interpolation=cv2.INTER_AREA)
+    small = weighted.reshape(size_px, SUPERSAMPLING, size_px, SUPERSAMPLING, 4).mean(axis=(1, 3))
     colours = small[..., :3] / np.maximum(small[..., 3:], 1e-6)
     return np.asarray(np.rint(np.concatenate([colours, small[..., 3:] * 255.0], axis=2)), dtype=np.uint8)
 
 
 def png_data_uri(picture: NDArray[np.uint8]) -> str:
-    """A picture as a ``data:`` URL inside the page."""
-    _, encoded = cv2.imencode(".png", picture)
-    return "data:image/png;base64," + base64.b64encode(encoded.tobytes()).decode("ascii")
+    """A picture of shape (height, width, 4), red green blue alpha, as a ``data:`` URL inside the page."""
+    return "data:image/png;base64," + base64.b64encode(_png(picture)).decode("ascii")
+
+
+def _png(picture: NDArray[np.uint8]) -> bytes:
+    """Every line is written as what it adds to the one above, which packs well."""
+    height, width, _ = picture.shape
+    lines = np.diff(picture, axis=0, prepend=np.zeros_like(picture[:1])).reshape(height, -1)
+    filtered = np.column_stack([np.full(height, _PNG_UP, np.uint8), lines])
+    head = struct.pack(">IIBBBBB", width, height, 8, _PNG_RGBA, 0, 0, 0)
+    chunks = ((b"IHDR", head), (b"IDAT", zlib.compress(filtered.tobytes(), 9)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(map(_chunk, *zip(*chunks, strict=True)))
+
+
+def _chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
 def _centre(vertices_m: Array) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from drivers.camera.camera import Camera
 from drivers.camera.camera_process import CameraProcess
 from drivers.core.clock import NANOSECONDS, Clock
+from drivers.core.installed.extras import require_package
 from drivers.core.transports import TappedTransport, Transport
 from drivers.fingertips.kind import LinkedKind
 from drivers.fingertips.wiring import make_transport
@@ -77,6 +78,7 @@ def _streams(rig: Rig, observer: Observer, clock: Clock) -> dict[str, SensorStre
 def _camera(rig: Rig, observer: Observer, clock: Clock) -> Camera | None:
     if (wiring := wires_of(rig).camera) is None:
         return None
+    require_package("cv2")
     transport: Transport
     if isinstance(wiring, RemoteCamera):
         transport = TcpTransport(CAMERA_LINK, wiring.host, wiring.port, clock)

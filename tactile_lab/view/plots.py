@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import Any
 
-import cv2
 import numpy as np
 import viser
+from PIL import Image, UnidentifiedImageError
 
 from drivers.core.contacts import FINGERS
 from tactile_lab.view.scene import Scene
@@ -56,12 +57,12 @@ class Plots:
 
 def shown_picture(encoded: bytes) -> np.ndarray[Any, np.dtype[np.uint8]] | None:
     """A picture small enough for a panel, red green blue; None if it cannot be decoded."""
-    image = cv2.imdecode(np.frombuffer(encoded, np.uint8), cv2.IMREAD_COLOR) if encoded else None
-    if image is None:
+    try:
+        with Image.open(BytesIO(encoded)) as image:
+            image.thumbnail((_WIDEST_px, image.height))
+            return np.asarray(image.convert("RGB"))
+    except (UnidentifiedImageError, Image.DecompressionBombError, OSError, ValueError):
         return None
-    shrink = min(1.0, _WIDEST_px / image.shape[1])
-    small = image if shrink == 1.0 else cv2.resize(image, None, fx=shrink, fy=shrink, interpolation=cv2.INTER_AREA)
-    return np.asarray(small[..., ::-1], dtype=np.uint8)
 
 
 def _plot(server: viser.ViserServer, names: tuple[str, ...], x_label: str, y_label: str) -> Any:

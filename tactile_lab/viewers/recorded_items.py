@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from drivers.camera.frames import Detection
 from drivers.camera.packet import picture_of
 from drivers.force.force_samples import WrenchSample
 from sessions.perception.interpreter import CAMERA_LINK, HAND_LINK, Interpreter
@@ -43,6 +44,8 @@ class RecordedItems:
         self._story = Story(self.robot, camera_of_rig(rig))
         self._due_ns: dict[str, int] = {}
         self._samples: list[tuple[str, Any]] = []
+        self._found: Detection | None = None
+        """The markers in the camera's newest frame."""
 
     def __iter__(self) -> Iterator[Item]:
         """Everything, once. Raises SessionError."""
@@ -57,7 +60,7 @@ class RecordedItems:
                 self._interpreter.on_received(transport, message.data, message.stamp_ns)
                 yield from self._decoded(message.stamp_ns)
                 if transport == CAMERA_LINK and (picture := picture_of(message.data)):
-                    yield from self._story.picture(message.stamp_ns, picture)
+                    yield from self._story.picture(message.stamp_ns, picture, self._found)
             elif message.topic == schemas.SESSION_EVENTS_TOPIC:
                 self._interpreter.event(SessionEvent.from_bytes(message.data, where=str(traffic.path)))
             elif message.topic in STORY_TOPICS - _FROM_BYTES:
@@ -70,6 +73,8 @@ class RecordedItems:
         for transport, sample in samples:
             if transport == HAND_LINK and seen.ready and self._is_due(HAND_LINK, stamp_ns):
                 yield from self._story.state(stamp_ns, seen.joints_rad, seen.base_q)
+            elif transport == CAMERA_LINK:
+                self._found = sample.detection
             elif transport.startswith("ft/"):
                 for one in (reading for reading in sample if isinstance(reading, WrenchSample)):
                     if self._is_due(transport, one.stamp_ns):

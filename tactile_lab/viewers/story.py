@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from gtsam import Pose3, Rot3
 
+from drivers.camera.frames import Detection
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
 from drivers.shadow.model.kinematics import JOINTS
@@ -75,11 +76,13 @@ class Story:
         """A force sensor's raw wrench, shape (6,), N and N m."""
         yield SensorWrench(stamp_ns, finger, self.robot.sensor_frame(finger), wrench[:3], wrench[3:])
 
-    def picture(self, stamp_ns: int, encoded: bytes) -> Iterator[Item]:
-        """A camera picture. The first that shows the world marker determines the camera's pose."""
+    def picture(self, stamp_ns: int, encoded: bytes, found: Detection | None = None) -> Iterator[Item]:
+        """A camera picture, and the markers in it if they are known. The first that shows the world marker determines
+        the camera's pose.
+        """
         yield Picture(stamp_ns, encoded)
-        if self._camera is not None and (found := self._camera.first_sight(encoded)) is not None:
-            yield self._lasting(stamp_ns, Placement(WORLD, CAMERA, found))
+        if self._camera is not None and (pose := self._camera.first_sight(encoded, found)) is not None:
+            yield self._lasting(stamp_ns, Placement(WORLD, CAMERA, pose))
 
     def _lasting(self, stamp_ns: int, *placements: Placement) -> Frames:
         """All that never move so far: who comes late, or jumps in a recording, is given the newest message alone."""

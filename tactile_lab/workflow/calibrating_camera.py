@@ -9,8 +9,8 @@ from calibration.camera.intrinsics import PARAMETERS, LensLimits, LensResult
 from calibration.camera.views import BoardView, Coverage, adds_something, coverage, view_of
 from calibration.store.store import CalibrationRecord, Covariance, new_record
 from drivers.camera.boards import AnyBoard
+from drivers.camera.detection import other_dictionary
 from drivers.camera.frames import Image
-from drivers.camera.markers import other_dictionary
 from drivers.camera.pictures import Picture
 from drivers.camera.source_settings import CameraSourceSettings
 from drivers.camera.sources import open_source

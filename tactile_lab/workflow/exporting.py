@@ -132,9 +132,10 @@ def export_parquet(session: Session, folder: Path) -> int:
 
 def export_lerobot(session: Session, folder: Path) -> int:
     """The session as a LeRobotDataset of one episode; gives its frames. Raises SessionError, or ConfigurationError
-    without PyArrow.
+    without PyArrow or OpenCV.
     """
     require_package("pyarrow")
+    require_package("cv2")  # for the video
     from tactile_lab.viewers.lerobot.dataset import Label, RATE_Hz, write_lerobot
     from tactile_lab.viewers.lerobot.sampling import SampledSession
 

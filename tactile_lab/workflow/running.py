@@ -104,6 +104,8 @@ def _require_packages(rig: Rig, request: SessionRequest, attendance: Attendance)
     """Raises ConfigurationError where an extra is missing that this session needs."""
     if rig.description.kind == "simulated" or rig.description.emulated:
         require_package("mujoco")
+    if "camera" in rig.files:
+        require_package("cv2")  # for the markers in its pictures
     if _conductor_settings(rig, request).exploration.policy and not attendance.guides:
         require_package("numba")  # for the rays that policies cast
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-import cv2
 import numpy as np
 from gtsam import Pose3, Rot3
 
@@ -17,6 +16,7 @@ from drivers.camera.boards import AnyBoard, CharucoBoard, GridBoard, SingleMarke
 from drivers.camera.calibration import CameraCalibration
 from drivers.camera.frames import Image
 from drivers.camera.markers import MarkerSettings
+from drivers.camera.opencv import cv2
 from drivers.camera.pictures import Picture
 from drivers.camera.rendering.settings import CameraSettings
 from drivers.camera.rendering.table_camera import PrintedMarker, TableCamera

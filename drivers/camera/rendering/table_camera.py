@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
 
-import cv2
 import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
 
 from drivers.camera.calibration import CameraCalibration
+from drivers.camera.opencv import cv2
 from drivers.camera.rendering.settings import CameraSettings
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError

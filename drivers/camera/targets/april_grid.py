@@ -9,20 +9,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-import cv2
 import numpy as np
 from pydantic import Field, model_validator
 
+from drivers.camera.detection import coarse_markers
 from drivers.camera.edges import refine_square
 from drivers.camera.frames import Image
-from drivers.camera.markers import coarse_markers
+from drivers.camera.opencv import cv2
 from drivers.camera.targets.printed import MarkerPrint
 from drivers.core.contacts import Array
 
 _HALF_TURN = 2
 _WINDOW_gaps, _SMALLEST_WINDOW_px = 0.5, 2
 """A corner is refined in a window of so many gaps to each side: less misses it, more meets the tag's modules."""
-_UNTIL = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, 60, 0.003)
+_ROUNDS, _ENOUGH_px = 60, 0.003
 
 
 class AprilGrid(MarkerPrint):
@@ -93,7 +93,8 @@ class AprilGrid(MarkerPrint):
                 gap_px = self.gap_m / self.side_m * float(np.linalg.norm(quad[0] - quad[1]))
                 half = max(_SMALLEST_WINDOW_px, round(_WINDOW_gaps * gap_px))
                 corners = quad.astype(np.float32).reshape(-1, 1, 2).copy()
-                found[number] = cv2.cornerSubPix(image, corners, (half, half), (-1, -1), _UNTIL)[:, 0].astype(float)
+                until = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_MAX_ITER, _ROUNDS, _ENOUGH_px)
+                found[number] = cv2.cornerSubPix(image, corners, (half, half), (-1, -1), until)[:, 0].astype(float)
         return found
 
     def marker_corners_m(self, number: int) -> Array:

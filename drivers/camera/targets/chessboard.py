@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-import cv2
 import numpy as np
 from pydantic import Field
 
 from drivers.camera.frames import Image
+from drivers.camera.opencv import cv2
 from drivers.camera.targets.printed import Printed
 from drivers.core.contacts import Array
 
-_FLAGS = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
 _RISE_sigmas = 2.563
 """OpenCV measures an edge from a tenth to nine tenths of its height: this many sigmas of a Gaussian blur."""
 
@@ -84,5 +83,6 @@ class Chessboard(Printed):
         return [float(np.ravel(sharpness)[0]) / _RISE_sigmas]
 
     def _found(self, image: Image) -> Array | None:
-        found, pixels = cv2.findChessboardCornersSB(image, (self.columns - 1, self.rows - 1), flags=_FLAGS)
+        flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_ACCURACY
+        found, pixels = cv2.findChessboardCornersSB(image, (self.columns - 1, self.rows - 1), flags=flags)
         return np.asarray(pixels, float).reshape(-1, 2) if found else None

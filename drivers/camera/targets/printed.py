@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
-import cv2
 import numpy as np
 from pydantic import field_validator
 
+from drivers.camera.detection import dictionary_or_file, opencv_dictionary, seen_markers
 from drivers.camera.frames import Image
-from drivers.camera.markers import dictionary_or_file, opencv_dictionary, seen_markers
+from drivers.camera.markers import MARKER_COUNTS
+from drivers.camera.opencv import cv2
 from drivers.core.configuration import StrictModel
 
 CHECK_BAR_mm, LARGEST_SCALE_ERROR = 100.0, 0.005
@@ -89,6 +90,6 @@ class MarkerPrint(Printed):
         return opencv_dictionary(self.dictionary)
 
     def _check_numbers(self, largest: int) -> None:
-        count = len(self.opencv_dictionary.bytesList)
+        count = MARKER_COUNTS.get(self.dictionary) or len(self.opencv_dictionary.bytesList)
         if largest >= count:
             raise ValueError(f"{self.dictionary} has markers 0 to {count - 1}, not {largest}")

@@ -13,11 +13,13 @@ from typing import Any
 from drivers.core.errors import ConfigurationError
 
 EXTRAS = {
+    "cv2": "camera",
     "mujoco": "sim",
     "coacd": "sim",
     "numba": "explore",
     "fpdf": "hardware",
     "viser": "view",
+    "PIL": "view",
     "websockets": "view",
     "foxglove": "export",
     "rerun": "rerun",

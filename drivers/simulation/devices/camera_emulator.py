@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import cv2
 import numpy as np
 
 from drivers.camera.camera import TRIGGER
+from drivers.camera.detection import detection
 from drivers.camera.frames import Frame, decode_image
-from drivers.camera.markers import detection
+from drivers.camera.opencv import cv2
 from drivers.camera.packet import encode_packet
 from drivers.camera.rendering.settings import CameraSettings
 from drivers.camera.rendering.table_camera import Placed, TableCamera

@@ -15,8 +15,9 @@ from gtsam import Pose3
 
 from drivers.camera.aruco import ObjectSighting, ObjectTracker, detection_in
 from drivers.camera.calibration import CameraCalibration
+from drivers.camera.detection import detection
 from drivers.camera.frames import Detection, Frame
-from drivers.camera.markers import MarkerSettings, detection
+from drivers.camera.markers import MarkerSettings
 from drivers.camera.packet import decode_packet
 from drivers.core.errors import CodecError
 from drivers.core.transports import Datagram

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.camera.opencv import cv2
 from drivers.core.errors import SessionError
 from tactile_lab.viewers.lerobot.statistics import PictureStatistics, Statistics, levels_of
 

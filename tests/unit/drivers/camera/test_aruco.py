@@ -12,17 +12,11 @@ from gtsam import Pose3, Rot3
 
 from drivers.camera.aruco import FACE_DOWN, ObjectTracker, fit_in_plane, is_ambiguous
 from drivers.camera.calibration import CameraCalibration, load_camera
+from drivers.camera.detection import detect, detection, other_dictionary
 from drivers.camera.frames import Detection, Frame, Image, decode_image
 from drivers.camera.glass import Glass
-from drivers.camera.markers import (
-    MarkerPose,
-    MarkerSettings,
-    detect,
-    detection,
-    marker_corners,
-    marker_poses,
-    other_dictionary,
-)
+from drivers.camera.markers import MarkerSettings, marker_corners
+from drivers.camera.pose.square_pose import MarkerPose, marker_poses
 from drivers.core.contacts import Array
 from drivers.core.fingertip import RigidTransform
 from drivers.core.poses import rotation_angle_rad, transform_points

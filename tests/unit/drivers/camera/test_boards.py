@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
 
-from drivers.camera.board_pose import board_pose, pose_covariance
 from drivers.camera.boards import CharucoBoard, GridBoard, SingleMarker, load_board
 from drivers.camera.calibration import CameraCalibration, load_camera
 from drivers.camera.frames import decode_image
+from drivers.camera.pose.board_pose import board_pose, pose_covariance
 from drivers.camera.rendering.board_camera import board_poses, draw_board, simulated_lens
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError

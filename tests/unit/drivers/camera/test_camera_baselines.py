@@ -10,14 +10,16 @@ import pytest
 from gtsam import Pose3, Rot3
 
 from drivers.camera.aruco import ObjectTracker
-from drivers.camera.board_pose import board_pose, pose_covariance
 from drivers.camera.boards import AnyBoard, CharucoBoard, GridBoard, SingleMarker
 from drivers.camera.calibration import CameraCalibration
+from drivers.camera.detection import detection
 from drivers.camera.edges import refine_square
 from drivers.camera.frames import Detection, Frame, Image, SeenMarker
 from drivers.camera.glass import Glass
-from drivers.camera.markers import MarkerSettings, detection, marker_poses
+from drivers.camera.markers import MarkerSettings
 from drivers.camera.packet import encode_packet
+from drivers.camera.pose.board_pose import board_pose, pose_covariance
+from drivers.camera.pose.square_pose import marker_poses
 from drivers.camera.printing.print_files import svg_text
 from drivers.camera.printing.print_layout import sheet_of
 from drivers.camera.rendering.board_camera import board_poses, draw_board, simulated_lens

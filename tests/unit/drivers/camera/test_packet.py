@@ -70,7 +70,7 @@ def told(width: int, height: int) -> bytes:
         (encode_packet(FRAME, PICTURE[:-9]), "PNG truncated"),
         (told(65, 48), "instead of 65 x 48"),
         (told(63, 48), "a picture of 64 x 48 pixels"),
-        (encode_packet(FRAME)[:-4] + b"\x00\x00\xc0\x7f", "not numbers"),
+        (encode_packet(FRAME)[:-4] + b"\x00\x00\xc0\x7f", "no places in a picture"),
     ],
 )
 def test_a_damaged_packet_is_a_codec_error(payload: bytes, complaint: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import cv2
 import numpy as np
 from gtsam import Pose3, Rot3
 
@@ -14,11 +15,12 @@ from tactile_lab.report.camera_picture import CameraView, draw_on_picture
 
 ABOVE = Pose3(Rot3(np.diag([1.0, -1.0, -1.0])), np.array([0.0, 0.0, 0.5])).inverse()
 """``camera_T_world`` of a camera half a metre above the table that looks down, which is easier to imagine."""
+PICTURE = cv2.imencode(".jpg", np.full((480, 640), 90, np.uint8))[1].tobytes()
 LENS = CameraCalibration(focal_px=(800.0, 800.0), centre_px=(320.0, 240.0), distortion=(0.0,) * 5)
 
 
 def view() -> CameraView:
-    return CameraView(0, np.full((480, 640), 90, np.uint8), LENS, MarkerSettings(), ABOVE)
+    return CameraView(0, PICTURE, LENS, MarkerSettings(), ABOVE)
 
 
 def square(side_m: float, x_m: float = 0.0) -> Array:

@@ -320,6 +320,6 @@ def test_still_picture_shows_the_near_side_on_a_clear_background() -> None:
     picture = render(np.asarray(box.vertices), np.asarray(box.faces), colours, VIEWS[2], 60)
     assert picture.shape == (60, 60, 4)
     assert picture[30, 30, 3] == 255
-    assert picture[30, 30, 2] > 200
-    assert picture[30, 30, 0] == 0
+    assert picture[30, 30, 0] > 200
+    assert picture[30, 30, 2] == 0
     assert picture[0, 0, 3] == 0

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from drivers.camera.boards import AnyBoard, CharucoBoard, GridBoard, SingleMarker, load_board
+from drivers.camera.detection import detect
 from drivers.camera.frames import Image
-from drivers.camera.markers import MarkerSettings, detect
+from drivers.camera.markers import MarkerSettings
 from drivers.camera.printing.print_files import pdf_bytes, svg_text
 from drivers.camera.printing.print_layout import check_bar, outlines, sheet_of
 from drivers.camera.targets.april_grid import AprilGrid

@@ -80,9 +80,12 @@ def test_the_base_needs_no_package_of_an_extra_and_the_simulated_rig_names_its_o
     assert not (tmp_path / "runs").exists()
 
 
-def test_a_policy_names_the_extra_that_it_needs(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("package", "extra"), [("numba", "explore"), ("cv2", "camera")])
+def test_a_session_names_the_extra_that_its_policy_or_camera_needs(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, package: str, extra: str
+) -> None:
     find = extras.find_spec
-    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == "numba" else find(name))
-    with pytest.raises(ConfigurationError, match=r"numba of the extra \[explore\]"):
+    monkeypatch.setattr(extras, "find_spec", lambda name: None if name == package else find(name))
+    with pytest.raises(ConfigurationError, match=rf"{package} of the extra \[{extra}\]"):
         run_session(SessionRequest("sim", "box-10x6x4", tmp_path / "runs", policy="information"), NullProgress())
     assert not (tmp_path / "runs").exists()

@@ -11,8 +11,9 @@ from gtsam import Pose3, Rot3
 
 from drivers.camera.aruco import FACE_DOWN, ObjectTracker
 from drivers.camera.camera import Camera
+from drivers.camera.detection import detect
 from drivers.camera.frames import Frame, decode_image
-from drivers.camera.markers import detect, marker_corners
+from drivers.camera.markers import marker_corners
 from drivers.camera.rendering.settings import CameraSettings
 from drivers.camera.rendering.table_camera import PrintedMarker, TableCamera
 from drivers.core.errors import ConfigurationError

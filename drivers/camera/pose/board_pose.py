@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
 from gtsam import Pose3
 
 from drivers.camera.calibration import CameraCalibration
-from drivers.camera.joint_pose import cross_matrices
-from drivers.camera.markers import MarkerPose, points_reprojection_px, refine_pose
+from drivers.camera.opencv import cv2
+from drivers.camera.pose.joint_pose import cross_matrices
+from drivers.camera.pose.square_pose import MarkerPose, points_reprojection_px, refine_pose
 from drivers.core.contacts import Array
 from drivers.core.poses import rotation_angle_rad, transform_points
 

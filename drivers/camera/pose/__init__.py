@@ -1,0 +1,1 @@
+"""Poses from the corners of flat things: squares, boards, and both markers of the table together."""
