@@ -63,6 +63,7 @@ def camera(
     from drivers.camera.source_settings import CameraSourceSettings
     from drivers.core.clock import MonotonicClock
     from drivers.core.configuration import validate
+    from drivers.core.installed.extras import require_package
     from tactile_lab.cli.calibrate.steps import store_result
     from tactile_lab.cli.calibrate.wizard import may_write, wizard
     from tactile_lab.workflow.calibrating_camera import LENS_COMMENT, gather_views, lens_record
@@ -70,6 +71,7 @@ def camera(
     file = out or Path("calibrations") / installation / "camera.yaml"
     page = PageAddress.if_wanted(view, listen, view_port, token, certificate)
     with wizard("calibrate camera", no_input, page) as asker:
+        require_package("cv2")
         may_write(file, replace, asker, no_input)
         shown = load_board(board) if board is not None else _usual_board()
         wanted = {"source": source, "size_px": _size(size), "exposure_ms": exposure_ms, "focus": focus}
