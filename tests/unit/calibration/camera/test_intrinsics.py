@@ -70,7 +70,7 @@ def test_a_lens_without_deviations_is_none(monkeypatch: pytest.MonkeyPatch) -> N
     def undetermined(*arguments: object, **options: object) -> tuple[object, ...]:
         return 1.23, np.eye(3), np.zeros(5), None, None, np.full(9, np.nan), None, np.zeros(8)
 
-    monkeypatch.setattr(cv2, "calibrateCameraExtended", undetermined)
+    monkeypatch.setattr("calibration.camera.intrinsics.cv2.calibrateCameraExtended", undetermined)
     with pytest.raises(ConfigurationError, match=r"no lens fits the views \(reprojection error 1\.2 px\)"):
         calibrate_lens(views(8))
 
