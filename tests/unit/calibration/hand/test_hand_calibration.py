@@ -90,6 +90,10 @@ def test_a_correction_that_is_too_large_is_refused():
     [
         ("rig: other\nposes: [{known_deg: {FFJ3: 0}, measured_deg: {FFJ3: 1}}]", "recorded on rig other"),
         ("rig: simulated-hand\nposes: [{known_deg: {XXJ3: 0}, measured_deg: {XXJ3: 1}}]", "unknown joints XXJ3"),
+        (
+            "rig: simulated-hand\nposes: [{known_deg: {FFJ3: 0}, measured_deg: {FFJ3: 1, YYJ1: 2}}]",
+            "unknown joints YYJ1",
+        ),
         ("rig: simulated-hand\nposes: [{known_deg: {FFJ3: 0}, measured_deg: {}}]", "has no measured FFJ3"),
         ("rig: simulated-hand\nposes: []", "poses"),
     ],
