@@ -101,8 +101,6 @@ def experiment(
         rows = run_cells(name, cells, study.work, folder / LINES_FILE, settings, progress.on_finished)
     command = _command(name, seeds, only or [], grasps, jobs)
     write_report(study, rows, folder, processes, command)
-    if parquet is not None:
-        write_parquet(parquet, name, rows)
     if store:
         made = _of_study(study, kept_rows(name, folder / LINES_FILE), grasps)
         _store(docs, study, part_of(study, made, processes, command, grasps), forget)
@@ -112,6 +110,8 @@ def experiment(
         head, *body = short_table(group_runs(rows, over=study.pooled), study.columns)
         show_table(study.sentence, head, body)
     answer(f"results  {folder}")
+    if parquet is not None:
+        write_parquet(parquet, name, rows)
     _end(rows)
 
 

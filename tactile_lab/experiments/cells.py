@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, TypeAlias
@@ -89,6 +89,9 @@ class Row:
 
 Work: TypeAlias = Callable[[Cell], Mapping[str, Any]]
 """Runs a cell and returns its figures; a function at module level, so that other processes can import it."""
+
+Execute: TypeAlias = Callable[[Sequence[Cell], Work], Iterator[Row]]
+"""Makes runs, somewhere, and yields their rows as they are finished."""
 
 
 def execute(cell: Cell, work: Work) -> Row:

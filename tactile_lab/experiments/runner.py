@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,8 +20,8 @@ from drivers.core.atomic_files import write_whole
 from drivers.core.errors import ConfigurationError
 from drivers.core.reading.bounded_files import MB, read_bounded
 from drivers.core.reading.json_text import parse_json
-from tactile_lab.experiments.cells import Cell, Row, Work, execute
-from tactile_lab.experiments.execution.cluster import run_on_cluster
+from tactile_lab.experiments.cells import Cell, Execute, Row, Work, execute
+from tactile_lab.experiments.execution.cluster import cluster_at
 from tactile_lab.experiments.execution.process_pool import run_in_processes
 from tactile_lab.experiments.execution.source_version import version
 
@@ -84,8 +85,9 @@ def run_cells(
         known = {**_rows_of_another_machine(name, other), **known}
     missing = [cell for cell in cells if cell.key not in known]
     done = len(cells) - len(missing)
-    with _appending(name, file, by, list(known.values())) as out:
-        for row in _execute(missing, work, settings):
+    place = _place(settings) if missing else nullcontext(_execute_here)
+    with place as execute_all, _appending(name, file, by, list(known.values())) as out:
+        for row in execute_all(missing, work):
             known[row.cell.key] = row
             out.write(_line(row.as_json()))
             out.flush()
@@ -94,12 +96,17 @@ def run_cells(
     return [known[cell.key] for cell in cells]
 
 
-def _execute(cells: Sequence[Cell], work: Work, settings: RunnerSettings) -> Iterator[Row]:
+def _place(settings: RunnerSettings) -> AbstractContextManager[Execute]:
+    """Where runs are made; entered before the file is opened: a cluster that is not there costs no earlier result."""
     if settings.scheduler:
-        return run_on_cluster(cells, work, settings.scheduler, settings.shared)
-    if settings.jobs == 1 or len(cells) < 2:
+        return cluster_at(settings.scheduler, settings.shared)
+    return nullcontext(partial(_execute_here, jobs=settings.jobs))
+
+
+def _execute_here(cells: Sequence[Cell], work: Work, jobs: int = 1) -> Iterator[Row]:
+    if jobs == 1 or len(cells) < 2:
         return map(partial(execute, work=work), cells)
-    return run_in_processes(cells, work, settings.jobs)
+    return run_in_processes(cells, work, jobs)
 
 
 def check_results(name: str, file: Path, others: Sequence[Path] = ()) -> None:

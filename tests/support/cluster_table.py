@@ -29,7 +29,7 @@ from tests.support.repository import REPOSITORY
 from tests.support.stored_table import GrowingTable, Outline, parser
 
 NAME, WORKERS, GRASPS, FIRST_SEED = "cluster-sessions", 2, 4, 1000
-MEASURED = ("process", "cpu_s", "resident_MB")
+MEASURED = ("process", "cpu_s", "begun_s", "ended_s", "resident_MB")
 """What the runs add to the figures of a session: these alone may differ between pool and cluster."""
 
 OUTLINE = Outline(
@@ -38,8 +38,12 @@ OUTLINE = Outline(
     ("python -m tests.support.cluster_table --sessions 1000 --store",),
     "A scheduler, two workers and the client on a machine of two cores. A worker is killed (SIGKILL) when a third of "
     "the sessions is made, the client when two thirds are, and started again. Efficiency: processor time of the "
-    "sessions that are in the table, by that which there was for them: of all processes of the study, from the first "
-    "client's start to the second one's end, and what the two cores were idle meanwhile. "
+    "sessions that are in the table, by that which there was for them: of all processes of the study, from the "
+    "cluster's start to its end, and what the two cores were idle from the first client's start to the second one's "
+    "end. What other programs take of the cores is in neither; but a wait of ours in which another program used the "
+    "core does not show. Workers in sessions: share of the two workers' time by the clock, from the first client's "
+    "start to the second one's end, in which they made sessions that are in the table; such a wait shows there, and "
+    "other programs make sessions and all else longer alike. "
     "Memory: the largest that a worker process has held when a quarter of its sessions were made, and at its end.",
     (
         "Sessions, method",
@@ -47,6 +51,7 @@ OUTLINE = Outline(
         "Processor s a session",
         "s in all",
         "Efficiency",
+        "Workers in sessions",
         "Worker MB, quarter",
         "Worker MB, end",
     ),
@@ -126,6 +131,11 @@ def _wait(file: Path, rows: int, client: subprocess.Popen[bytes]) -> None:
         time.sleep(0.1)
 
 
+def _lasted_s(row: Row) -> float:
+    """A session's time by the clock."""
+    return float(row.figures["ended_s"] - row.figures["begun_s"]) if row.figures else 0.0
+
+
 def _memory(rows: Sequence[Row]) -> tuple[float, float]:
     """The most that the process with the most sessions has held: after a quarter of its sessions, and at its end."""
     held: dict[int, list[float]] = {}
@@ -181,6 +191,7 @@ def _put(table: GrowingTable, method: str, pooled: Sequence[Row], made: Sequence
         f"{sessions_s / len(made):.2f}",
         f"{spent.whole_s:.0f}",
         f"{sessions_s / (spent.used_s + spent.idle_s):.0%}",
+        f"{sum(map(_lasted_s, made)) / (WORKERS * spent.whole_s):.0%}",
         f"{early:.0f}",
         f"{late:.0f}",
     )

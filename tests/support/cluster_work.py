@@ -38,9 +38,12 @@ def sees_nothing(file: str) -> bool:
 
 
 def measured(cell: Cell) -> dict[str, Any]:
-    """A session's figures, the process that made it, what it cost, and the most memory that its process has held."""
-    begun_s = time.process_time()
+    """A session's figures, the process that made it, when it began and ended, its thread's processor time, and the most
+    memory that its process has held.
+    """
+    begun_s, used_s = time.monotonic(), time.thread_time()
     figures = track_in_plane(cell)
+    spent_s, ended_s = time.thread_time() - used_s, time.monotonic()
     most_kB = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    spent_s = time.process_time() - begun_s
-    return {**figures, "process": os.getpid(), "cpu_s": spent_s, "resident_MB": most_kB / 1024}
+    made_by = {"process": os.getpid(), "resident_MB": most_kB / 1024}
+    return {**figures, **made_by, "begun_s": begun_s, "ended_s": ended_s, "cpu_s": spent_s}

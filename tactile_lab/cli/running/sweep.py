@@ -71,11 +71,11 @@ def sweep(
     runs = planned_runs(check_sweep(rig, names, out, method), chosen, drawn)
     cells = [cell_of(run, rig, method, grasps, check_replay) for run in runs]
     done = _run(cells, out, jobs, scheduler, merge or [])
-    if parquet is not None:
-        write_parquet(parquet, "sweep", done)
     rows = [row_of(row) for row in done]
     found = summaries(rows)
     _tell(rows, found, out, as_json)
+    if parquet is not None:
+        write_parquet(parquet, "sweep", done)
     if store:
         command = f"tactile-lab sweep --objects {objects} --seeds {seeds} --dimensions {dimensions}"
         command += f" --method {method} --grasps {grasps}"

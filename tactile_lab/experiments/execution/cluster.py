@@ -21,7 +21,7 @@ from uuid import uuid4
 
 from drivers.core.errors import ConfigurationError, SessionError
 from drivers.core.extensions import VARIABLE, load_named_extensions
-from tactile_lab.experiments.cells import Cell, Row, Work, execute
+from tactile_lab.experiments.cells import Cell, Execute, Row, Work, execute
 from tactile_lab.experiments.execution.source_version import version
 
 if TYPE_CHECKING:
@@ -36,25 +36,27 @@ _CONNECT_s, _LOOK_s, _PATIENCE_s = 5.0, 0.5, 120.0
 _RESUMES = "Finished runs are kept: the same command resumes behind them"
 
 
-def run_on_cluster(cells: Sequence[Cell], work: Work, address: str, shared: Path | None = None) -> Iterator[Row]:
-    """Yields rows as they are finished.
+@contextmanager
+def cluster_at(address: str, shared: Path | None = None) -> Iterator[Execute]:
+    """Connect to a cluster; gives what makes runs on it, and yields their rows as they are finished.
+
+    What runs a cell has to be a function that the workers can import. Making the rows raises SessionError when the
+    scheduler ended, no worker was left, or a run killed its workers.
 
     Args:
-        cells: the runs.
-        work: runs one cell; a function that the workers can import.
         address: of the scheduler, as ``tcp://host:8786`` or ``tls://host:8786``.
         shared: a folder that every worker has to see under the same path; None where the runs write nothing.
 
     Raises:
         ConfigurationError: there is no scheduler, its version or that of a worker is another, a worker has several
             threads, or does not see the folder.
-        SessionError: the scheduler ended, no worker was left, or a run killed its workers.
+        SessionError: the folder cannot be written.
     """
     with _connected(address) as client:
-        _check_cluster(client, address)
+        _check_workers(client, address)
         if shared is not None:
             _check_shared(client, shared)
-        yield from _Handover(client, address, work).rows(cells)
+        yield lambda cells, work: _Handover(client, address, work).rows(cells)
 
 
 @contextmanager
@@ -63,7 +65,7 @@ def _connected(address: str) -> Iterator[Client]:
 
     hint = "Start one with: dask scheduler; and workers with: dask worker ADDRESS --nworkers auto --nthreads 1"
     try:
-        asyncio.run(_greet(address))
+        _check_scheduler(asyncio.run(_greet(address)), address)
         client = Client(address, timeout=_CONNECT_s)
     except (OSError, ValueError, TypeError) as error:
         raise ConfigurationError(f"no scheduler answers ({error})", where=address, hint=hint) from error
@@ -77,34 +79,43 @@ def _connected(address: str) -> Iterator[Client]:
             client.close(timeout=_CONNECT_s)
 
 
-async def _greet(address: str) -> None:
-    """Exchange greetings, once: a client would wait without end for whoever accepts a connection and says nothing.
+async def _greet(address: str) -> str:
+    """The scheduler's version of Dask, asked once: a client would wait without end for whoever accepts a connection and
+    says nothing, and fails in its own words at a scheduler of another version.
 
     Raises:
         OSError, ValueError, TypeError, MemoryError: nobody answers in time, or not as a scheduler does.
     """
     from distributed.comm import connect
+    from distributed.core import send_recv
     from distributed.security import Security
 
     safety = Security().get_connection_args("client")
     try:
         comm = await asyncio.wait_for(connect(address, timeout=_CONNECT_s, **safety), 2 * _CONNECT_s)
+        found = await asyncio.wait_for(send_recv(comm, op="versions"), 2 * _CONNECT_s)
     except TimeoutError as error:
         raise TimeoutError(f"silent for {2 * _CONNECT_s:.0f} s") from error
     await comm.close()
+    return str(found["packages"]["distributed"])
 
 
 # --- what a cluster has to be --------------------------------------------------------------------------------------
 
 
-def _check_cluster(client: Client, address: str) -> None:
+_INSTALL = "Install this version of the program, with all it needs, on the workers' machines"
+_SAME_DASK = "Install the same version on every machine: runs and results are handed over in Dask's own form"
+
+
+def _check_scheduler(found: str, address: str) -> None:
     import distributed
 
-    found = client.get_versions(check=False)["scheduler"]["packages"]["distributed"]
     if found != distributed.__version__:
-        hint = "Install the same version on both: results are handed over in Dask's own form"
         what = f"the scheduler has distributed {found}, this program {distributed.__version__}"
-        raise ConfigurationError(what, where=address, hint=hint)
+        raise ConfigurationError(what, where=address, hint=_SAME_DASK)
+
+
+def _check_workers(client: Client, address: str) -> None:
     with suppress(TimeoutError):
         client.wait_for_workers(1, timeout=_CONNECT_s)
     threads = {name: worker["nthreads"] for name, worker in _workers(client).items()}
@@ -115,6 +126,37 @@ def _check_cluster(client: Client, address: str) -> None:
         hint = "Start workers with --nthreads 1, and as many as there are cores: --nworkers auto"
         what = f"{len(several)} of {len(threads)} workers have several threads, {several[0]} among them"
         raise ConfigurationError(what, where=address, hint=hint)
+    _check_dask(client, address)
+    _check_program(client, address)
+
+
+def _check_dask(client: Client, address: str) -> None:
+    """Of the workers."""
+    import distributed
+
+    for name, worker in client.get_versions(check=False)["workers"].items():
+        if (found := worker["packages"]["distributed"]) != distributed.__version__:
+            what = f"worker {name} has distributed {found}, this program {distributed.__version__}"
+            raise ConfigurationError(what, where=address, hint=_SAME_DASK)
+
+
+def _check_program(client: Client, address: str) -> None:
+    """Of the workers: one without it would end at its first run."""
+    for name, found in client.run(_own_version, on_error="return").items():
+        if isinstance(found, Exception):
+            what = f"worker {name} cannot make the runs ({found})"
+            raise ConfigurationError(what, where=address, hint=_INSTALL) from found
+        if found != version():
+            raise _another_version(found, address, f"worker {name}")
+
+
+def _own_version() -> str:
+    return version()
+
+
+def _another_version(found: str, address: str, who: str = "a worker") -> ConfigurationError:
+    hint = "Install the same version on every machine: results of several do not belong into one table"
+    return ConfigurationError(f"{who} has another version of the program, {found}", where=address, hint=hint)
 
 
 def _check_shared(client: Client, folder: Path) -> None:
@@ -217,15 +259,12 @@ class _Handover:
             self._deadly.append(cell.words())
             return None
         if error is not None:
-            hint = "Install this version of the program, with all it needs, on the workers' machines"
-            raise ConfigurationError(f"a worker cannot make the runs ({error})", where=self._address, hint=hint)
+            what = f"a worker cannot make the runs ({error})"
+            raise ConfigurationError(what, where=self._address, hint=_INSTALL)
         found = future.result()
         if isinstance(found, Row):
             return found
-        hint = "Install the same version on every machine: results of several do not belong into one table"
-        raise ConfigurationError(
-            f"a worker has another version of the program, {found}", where=self._address, hint=hint
-        )
+        raise _another_version(found, self._address)
 
 
 def _execute_on_worker(cell: Cell, work: Work, wanted: str, extensions: str) -> Row | str:

@@ -108,22 +108,54 @@ def test_a_worker_with_another_version_is_refused(cluster: DaskCluster, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("threads", "version", "words"),
+    ("threads", "version", "program", "words"),
     [
-        ([], distributed.__version__, r"has no workers.*dask worker tcp://there"),
-        ([1, 2], distributed.__version__, r"1 of 2 workers have several threads.*--nthreads 1"),
-        ([1], "1.0", r"the scheduler has distributed 1.0, this program \d"),
+        ([], distributed.__version__, "", r"has no workers.*dask worker tcp://there"),
+        ([1, 2], distributed.__version__, "", r"1 of 2 workers have several threads.*--nthreads 1"),
+        ([1], "1.0", "", r"worker tcp://0 has distributed 1.0, this program \d"),
+        ([1], distributed.__version__, ImportError("No module named 'x'"), r"worker tcp://0 cannot make.*'x'.*Install"),
+        ([1], distributed.__version__, "0123", r"worker tcp://0 has another version of the program, 0123"),
     ],
 )
-def test_a_cluster_that_gives_other_results_is_refused(threads: list[int], version: str, words: str) -> None:
+def test_workers_that_give_other_results_are_refused(
+    threads: list[int], version: str, program: str | ImportError, words: str
+) -> None:
     workers = {f"tcp://{number}": {"nthreads": each} for number, each in enumerate(threads)}
+    versions = {name: {"packages": {"distributed": version}} for name in workers}
     client: Any = SimpleNamespace(
-        get_versions=lambda check: {"scheduler": {"packages": {"distributed": version}}},
+        get_versions=lambda check: {"workers": versions},
+        run=lambda asked, on_error: dict.fromkeys(workers, program),
         scheduler_info=lambda n_workers: {"workers": workers},
         wait_for_workers=lambda number, timeout: None,
     )
     with pytest.raises(ConfigurationError, match=words):
-        cluster_module._check_cluster(client, "tcp://there")
+        cluster_module._check_workers(client, "tcp://there")
+
+
+def test_a_scheduler_of_another_version_is_told_in_our_words_and_costs_no_earlier_result(
+    cluster: DaskCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "runs.jsonl"
+    monkeypatch.setattr("tactile_lab.experiments.runner.version", lambda: "an earlier one")
+    run_cells("test", CELLS[:1], cluster_work.square, file)
+    monkeypatch.undo()
+    earlier = file.read_bytes()
+    monkeypatch.setattr(distributed, "__version__", "2025.1.0")
+    with pytest.raises(ConfigurationError, match=r"the scheduler has distributed \d.*, this program 2025.1.0"):
+        rows_of(cluster, file, cluster_work.square)
+    assert file.read_bytes() == earlier
+
+
+def test_no_scheduler_leaves_nothing_and_is_not_asked_for_where_all_runs_are_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster_module, "_CONNECT_s", 0.2)
+    settings, file = RunnerSettings(scheduler="tcp://127.0.0.1:9"), tmp_path / "runs.jsonl"
+    with pytest.raises(ConfigurationError, match="no scheduler answers"):
+        run_cells("test", CELLS[:1], cluster_work.square, file, settings)
+    assert not file.exists()
+    rows = run_cells("test", CELLS[:1], cluster_work.square, file)
+    assert run_cells("test", CELLS[:1], cluster_work.square, file, settings) == rows
 
 
 @pytest.mark.long
