@@ -116,7 +116,8 @@ def export_csv(session: Session, folder: Path) -> int:
 
 
 def export_hdf5(session: Session, path: Path) -> int:
-    """All samples as one HDF5 file; gives their rows. Raises SessionError."""
+    """All samples as one HDF5 file; gives their rows. Raises SessionError, or ConfigurationError without h5py."""
+    require_package("h5py")
     from sessions.exchange.table_files import write_hdf5
 
     return write_hdf5(_tables(session), path)
@@ -149,6 +150,7 @@ def export_rosbag(session: Session, folder: Path) -> int:
     """Frames, markers and all samples as a ROS 2 bag; gives its messages. Raises SessionError, or ConfigurationError
     without rosbags.
     """
+    require_package("rosbags")
     from tactile_lab.viewers.recorded_items import RecordedItems
     from tactile_lab.viewers.ros_bag import write_ros_bag
 

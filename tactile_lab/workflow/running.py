@@ -100,7 +100,7 @@ def check_request(request: SessionRequest) -> Rig:
     return rig
 
 
-def _require_packages(rig: Rig, request: SessionRequest, attendance: Attendance) -> None:
+def require_packages(rig: Rig, request: SessionRequest, attendance: Attendance = ALONE) -> None:
     """Raises ConfigurationError where an extra is missing that this session needs."""
     if rig.description.kind == "simulated" or rig.description.emulated:
         require_package("mujoco")
@@ -126,7 +126,7 @@ def run_session(request: SessionRequest, progress: Progress, attendance: Attenda
     """
     rig = check_request(request)
     check_calibration(rig)
-    _require_packages(rig, request, attendance)
+    require_packages(rig, request, attendance)
     overlooked = admit(rig.own_calibrations, rig.installation, allow_uncalibrated=request.allow_uncalibrated)
     slam = TactileSlam(slam_settings(request.method, request.dimension, rig.description.motion), request.seed)
     progress.phase(0, "connect")

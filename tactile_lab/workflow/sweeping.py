@@ -16,7 +16,7 @@ from tactile_lab.rigs.build import check_calibration
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.workflow.finishing import differing_files
 from tactile_lab.workflow.replaying import recorded_seed, recorded_slam, replay_session
-from tactile_lab.workflow.running import SessionRequest, refuse_known_pose, run_session
+from tactile_lab.workflow.running import SessionRequest, refuse_known_pose, require_packages, run_session
 
 
 def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str) -> tuple[str, ...]:
@@ -24,13 +24,14 @@ def check_sweep(rig: str, objects: Sequence[str] | None, root: Path, method: str
 
     Raises:
         ConfigurationError: no such rig, object or calibration, a mesh that cannot be used, a method that needs the
-            truth, or a folder of the sessions that cannot be made.
+            truth, an extra that is not installed, or a folder of the sessions that cannot be made.
     """
     refuse_known_pose(method)
     loaded = load_rig(rig)
     check_calibration(loaded)
     for name in objects or ():
         check_object(name)
+    require_packages(loaded, SessionRequest(rig, next(iter(objects or CATALOGUE)), root, method))
     try:
         root.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import cast
 
 import pytest
 
@@ -13,7 +14,10 @@ from drivers.core.errors import ConfigurationError
 from drivers.core.installed import extras
 from drivers.core.installed.extras import EXTRAS, LazyPackage, explain_missing, require_package
 from sessions.conductor.progress import NullProgress
+from sessions.recording.session import Session
+from tactile_lab.workflow.exporting import EXPORTS
 from tactile_lab.workflow.running import SessionRequest, run_session
+from tactile_lab.workflow.sweeping import check_sweep
 
 REPOSITORY = Path(__file__).resolve().parents[5]
 COMMAND = r"is not installed\. Install it: python3 -m pip --python .* install 'tactile-lab\[absent\]'$"
@@ -78,6 +82,19 @@ def test_the_base_needs_no_package_of_an_extra_and_the_simulated_rig_names_its_o
     assert "the package mujoco of the extra [sim] is not installed" in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "runs").exists()
+
+
+def test_a_sweep_and_exports_name_what_they_need_before_they_begin(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(extras, "find_spec", lambda name: None)
+    with pytest.raises(ConfigurationError, match=r"mujoco of the extra \[sim\]"):
+        check_sweep("sim", ("cube-6",), tmp_path / "sweep", "joint")
+    assert not (tmp_path / "sweep").exists()
+    unread = cast(Session, None)
+    for name, package in {"hdf5": "h5py", "rosbag": "rosbags", "parquet": "pyarrow", "lerobot": "pyarrow"}.items():
+        with pytest.raises(ConfigurationError, match=f"the package {package} of the extra"):
+            EXPORTS[name](unread, tmp_path / name)
 
 
 @pytest.mark.parametrize(("package", "extra"), [("numba", "explore"), ("cv2", "camera")])
