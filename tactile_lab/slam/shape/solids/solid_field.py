@@ -30,9 +30,24 @@ class SolidField:
         import igl  # here, so that importing this module stays quick
 
         kind = igl.SignedDistanceType.SIGNED_DISTANCE_TYPE_PSEUDONORMAL
-        found = igl.signed_distance(np.ascontiguousarray(points_m), self._vertices, self._faces, kind)
+        points_m = np.ascontiguousarray(points_m)
+        found = igl.signed_distance(points_m, self._vertices, self._faces, kind)
+        distances_m, nearest_m, normals = (np.asarray(found[part]) for part in (0, 2, 3))
+        # at a fold of the surface the normals of both sides cancel each other: that point has neither sign nor normal
+        if (folded := ~np.isfinite(normals).all(axis=1)).any():
+            seen = self._across(points_m[folded], nearest_m[folded])
+            distances_m[folded], normals[folded] = seen
         variance_m2 = self.variance(points_m) if variance else np.empty(0)
-        return Prediction(np.asarray(found[0]), np.asarray(found[3]) if gradient else np.empty((0, 3)), variance_m2)
+        return Prediction(distances_m, normals if gradient else np.empty((0, 3)), variance_m2)
+
+    def _across(self, points_m: Array, nearest_m: Array) -> tuple[Array, Array]:
+        """Signed distances by the winding number, shape (q,), and directions away from the inside, shape (q, 3)."""
+        import igl
+
+        inside = np.asarray(igl.winding_number(self._vertices, self._faces, points_m)).ravel() > 0.5
+        away = np.where(inside[:, None], nearest_m - points_m, points_m - nearest_m)
+        lengths_m = np.linalg.norm(away, axis=1)
+        return np.where(inside, -lengths_m, lengths_m), away / np.maximum(lengths_m, 1e-12)[:, None]
 
     def variance(self, points_m: Array, *, rough: bool = False) -> Array:
         """The surface's variance at points of shape (q, 3), shape (q,); ``rough`` has no effect."""
