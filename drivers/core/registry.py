@@ -35,7 +35,7 @@ class Registry(Generic[Item]):
         kind: what an entry is, in one or two words, for messages: "policy", "shape model".
         plural: of that word, unless an s will do.
         group: of the entry points by which packages offer such entries; "" where they cannot.
-        form: what an entry of a package must be an instance of; None: something that can be called.
+        form: what an entry must be an instance of; None: something that can be called.
     """
 
     _all: ClassVar[list[Registry[Any]]] = []
@@ -57,7 +57,7 @@ class Registry(Generic[Item]):
 
         Raises:
             ConfigurationError: the name is not valid on the command line and in file names, or it is in use; then both
-                files are named.
+                files are named. Or the item is no entry of this kind, such as a class in place of an instance.
         """
         file = sys._getframe(1).f_code.co_filename
         if not NAME.fullmatch(name):
@@ -66,6 +66,9 @@ class Registry(Generic[Item]):
         if name in self._entries:
             what = f"registers the {self.kind} {name!r}, a name already used by {self.file(name)}"
             raise ConfigurationError(what, where=file, hint="Choose another name")
+        if not self._fits(item):
+            what = f"registers as the {self.kind} {name!r} what is none: {type(item).__name__} {item!r:.60}"
+            raise ConfigurationError(what, where=file, hint="docs/extending.md says what it must be")
         self._entries[name] = _Entry(item, file)
 
     def __getitem__(self, name: str) -> Item:
@@ -83,12 +86,15 @@ class Registry(Generic[Item]):
 
     def _checked(self, plugin: Plugin, item: Any) -> Any:
         """What a plug-in gave. Raises ConfigurationError where it is not an entry of this kind."""
-        if callable(item) if self._form is None else isinstance(item, self._form):
+        if self._fits(item):
             return item
         what = (
             f"the plug-in {plugin.name!r} of {plugin.origin} is no {self.kind}, but {type(item).__name__} {item!r:.60}"
         )
         raise ConfigurationError(what, where=plugin.file, hint="docs/plugins.md says what it must be")
+
+    def _fits(self, item: Any) -> bool:
+        return callable(item) if self._form is None else isinstance(item, self._form)
 
     def __contains__(self, name: object) -> bool:
         return isinstance(name, str) and (name in self._entries or self.plugin(name) is not None)

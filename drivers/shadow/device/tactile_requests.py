@@ -61,7 +61,7 @@ BIOTAC_ROTATION: tuple[int, ...] = (
 )
 """The 14 requests after which every value of a BioTac is known."""
 
-ROTATIONS: Registry[tuple[int, ...]] = Registry("tactile rotation")
+ROTATIONS: Registry[tuple[int, ...]] = Registry("tactile rotation", form=tuple)
 """What the palm asks its fingertips for, cycle by cycle and over again, by the kind of fingertip."""
 
 ROTATIONS.register("none", (int(TactileRequest.NONE),))

@@ -26,7 +26,7 @@ REGISTER = "from tactile_lab.slam.exploration.policies import POLICIES\nPOLICIES
 
 @pytest.fixture
 def colours() -> Iterator[Registry[int]]:
-    made: Registry[int] = Registry("colour")
+    made: Registry[int] = Registry("colour", form=int)
     made.register("red", 1)
     made.register("green", 2)
     yield made
@@ -89,6 +89,26 @@ def test_an_extension_that_cannot_be_loaded_is_named_and_leaves_nothing(
     with pytest.raises(ConfigurationError, match=rf"broken\.py: this extension could not be loaded: .*{words}"):
         load_extension(path)
     assert "half" not in POLICIES
+    assert str(path) not in os.environ.get(VARIABLE, "")
+
+
+@pytest.mark.parametrize(
+    ("registry", "item", "words"),
+    [
+        ("drivers.fingertips.kinds.FINGERTIPS", "type('Kind', (), {})", "the fingertip kind 'mine'.*: type <class"),
+        ("drivers.positioner.kinds.POSITIONERS", "object()", "the positioner 'mine'.*: object <object"),
+        ("tactile_lab.slam.exploration.policies.POLICIES", "'quickest'", "the policy 'mine'.*: str 'quickest'"),
+        ("tactile_lab.cli.commands.COMMANDS", "3", "the command 'mine'.*: int 3"),
+    ],
+)
+def test_what_is_no_entry_of_the_kind_is_refused_where_it_is_registered(
+    written: Written, registry: str, item: str, words: str
+) -> None:
+    """A class where an instance belongs would else fail far from its file, and for everybody who lists the kinds."""
+    module, name = registry.rsplit(".", 1)
+    path = written("mine.py", f"from {module} import {name}\n{name}.register('mine', {item})\n")
+    with pytest.raises(ConfigurationError, match=rf"mine\.py: registers as {words}.*extending\.md"):
+        load_extension(path)
     assert str(path) not in os.environ.get(VARIABLE, "")
 
 
