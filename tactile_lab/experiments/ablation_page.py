@@ -13,7 +13,7 @@ from pathlib import Path
 
 from tactile_lab.evaluation.spread import Interval, quantile
 from tactile_lab.experiments.cells import Row
-from tactile_lab.experiments.runs.ablation_runs import CARRIED, LONG, PLANE, SPACE, WITHOUT, WRONG
+from tactile_lab.experiments.runs.ablation_runs import CARRIED, LEFT, LONG, PLANE, SPACE, WITHOUT, WRONG
 from tactile_lab.experiments.summary import LEFT_OUT, NOTHING, UNKNOWN, Column, Group, group_runs, markdown, paired
 
 PAGE, MAP = Path("docs/results/ablation.md"), Path("docs/estimator.md")
@@ -53,7 +53,7 @@ def ablation_page(rows: Sequence[Row], version: str) -> str:
     """The page in Markdown."""
     seeds = sorted({row.cell.seed for row in rows})
     text = _INTRODUCTION.format(version=version, seeds=f"{seeds[0]}-{seeds[-1]}", count=len(rows))
-    for condition in (PLANE, WRONG, SPACE, CARRIED, LONG):
+    for condition in (PLANE, WRONG, SPACE, CARRIED, LEFT, LONG):
         groups = _groups(rows, condition)
         if len(groups) > 1:
             text += f"## {condition.capitalize()}\n\n{_full(groups)}\n\n{markdown(_table(groups))}\n"

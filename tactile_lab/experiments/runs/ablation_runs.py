@@ -16,7 +16,7 @@ import numpy as np
 from gtsam import Pose3, Rot3
 
 from tactile_lab.experiments.cells import Cell, Row, Setting, grid
-from tactile_lab.experiments.data import planar_data, spatial_data
+from tactile_lab.experiments.data import left_in_place, planar_data, spatial_data
 from tactile_lab.experiments.data.carried_off import carried_off
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.run_metrics import slam_figures
@@ -27,18 +27,22 @@ _Result = TypeVar("_Result")
 
 NOTHING = "nothing"
 PLANE, WRONG, CARRIED, LONG, SPACE = "in the plane", "wrong contacts", "carried off", "long session", "in space"
+LEFT = "left in place"
 SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         PLANE: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         WRONG: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         CARRIED: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
+        LEFT: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         LONG: ("L", "ellipse"),
         SPACE: ("box-12x6x6", "triangular-prism", "ellipsoid", "cylinder", "hexagonal-prism", "l-block"),
     }
 )
-GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, CARRIED: 12, LONG: 60, SPACE: 12})
+GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, CARRIED: 12, LEFT: 12, LONG: 60, SPACE: 12})
 CARRIED_BEFORE, FARTHEST_m = 8, 0.15
 """Grasp before which somebody puts the object elsewhere, and by how much at most per axis; it is also turned."""
+UNHELD = 0.15
+"""Share of the motion's noise that applies to an object that was left in place, as rig ``sim`` has it."""
 CHECK_EVERY = 5
 """Seeds that are divisible by this are run again even where a mechanism changed nothing."""
 
@@ -61,6 +65,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "free space": _joint("free space"),
         "splicing": _joint("splicing"),
         "relocation": _joint("relocation"),
+        "pushes": _joint("pushes"),
         "deferred association": _joint("deferred association"),
         "faces": _joint("faces"),
         "doubts": _joint("doubts"),
@@ -100,14 +105,17 @@ _IN_SPACE_ONLY = (
 )
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
+_LEFT_ONLY = ("pushes",)
 _LONG_TOO = (NOTHING, "fixed lag")
 _CARRIED_TOO = (NOTHING, "relocation", "deferred association", "backward reading")
+_LEFT_TOO = (NOTHING, "pushes", "deferred association")
 _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         name: frozenset({name, *further})
         for name, further in {
             "splicing": (),
             "relocation": ("deferred association",),
+            "pushes": ("deferred association",),
             "deferred association": (),
             "doubts": (),
             "without one": (),
@@ -141,9 +149,9 @@ def settings(grasps: int) -> list[Setting]:
 
 
 def _left_out_in(condition: str) -> list[str]:
-    if condition in (LONG, CARRIED):
-        return list(_LONG_TOO if condition == LONG else _CARRIED_TOO)
-    impossible = (*_LONG_ONLY, *(_IN_PLANE_ONLY if condition == SPACE else _IN_SPACE_ONLY))
+    if (few := {LONG: _LONG_TOO, CARRIED: _CARRIED_TOO, LEFT: _LEFT_TOO}.get(condition)) is not None:
+        return list(few)
+    impossible = (*_LONG_ONLY, *_LEFT_ONLY, *(_IN_PLANE_ONLY if condition == SPACE else _IN_SPACE_ONLY))
     return [name for name in WITHOUT if name not in impossible]
 
 
@@ -176,6 +184,8 @@ def _full(condition: str, shape: str, grasps: int, seed: int) -> tuple[dict[str,
 def _data(condition: str, shape: str, grasps: int, seed: int) -> SimulatedGrasps:
     if condition == SPACE:
         return spatial_data.simulate(shape, seed, count=grasps)
+    if condition == LEFT:
+        return left_in_place.simulate(shape, seed, count=grasps)
     data = planar_data.simulate(shape, seed, count=grasps, outlier_share=0.1 if condition == WRONG else 0.0)
     return carried_off(data, CARRIED_BEFORE, _jump(seed)) if condition == CARRIED else data
 
@@ -188,6 +198,8 @@ def _jump(seed: int) -> Pose3:
 
 def _tracked(data: SimulatedGrasps, overlay: Overlay, cell: Cell) -> tuple[dict[str, Any], frozenset[str]]:
     given = {"dimension": 3 if cell["condition"] == SPACE else 2, **overlay}
+    if cell["condition"] == LEFT:
+        given["motion"] = {"unheld": UNHELD}
     slam = TactileSlam(SlamSettings.model_validate(given), cell.seed)
     steps_ms = [_processor_ms(partial(slam.add_grasp, grasp))[0] for grasp in data.grasps]
     finish_ms, result = _processor_ms(slam.finish)

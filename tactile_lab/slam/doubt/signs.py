@@ -120,8 +120,8 @@ def _unlikely(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
 def _large_together(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     """Whether slips of a carried object are too large on the whole: wrong places of many grasps need many of them.
 
-    A single large one does not count. Nor do steps that the fingertips measured, or in which the object was left lying:
-    those have heavy tails of their own.
+    A single large one does not count. Nor do steps that the fingertips measured, or in which the object was left in
+    place: those have heavy tails of their own.
     """
     slips, bound = _slips(contact_map, noise)
     measured = np.array([sigma is not None for sigma in contact_map.motion_sigmas[1:]], dtype=bool)

@@ -154,7 +154,7 @@ def test_a_top_alone_is_no_geometry():
 
 
 class Pretended:
-    """A station that gives simulated touches, and fails where told to."""
+    """A measurer that gives simulated touches, and fails where told to."""
 
     def __init__(self, touches, failing=()) -> None:
         self._touches, self._failing = list(touches), set(failing)

@@ -26,7 +26,7 @@ from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanism, Mechanisms
 
 MAP = Path(ROOT / "docs/estimator.md")
-NOT_EXERCISED = {"pushes", "surprises"}
+NOT_EXERCISED = {"surprises"}
 
 
 def left_out(name: str, *, seed: int = 5, shape: str = "ellipse") -> Cell:
