@@ -137,7 +137,7 @@ class Registry(Generic[Item]):
         plugin = self.plugin(name)
         return "" if plugin is None else plugin.file
 
-    def explain(self, name: str, error: Exception) -> str:
+    def explain(self, name: str, error: BaseException) -> str:
         """An error that an entry raised, in one line, with the line of its file where that is known."""
         return explain(error, self.file(name))
 

@@ -118,7 +118,7 @@ def computed(estimate: EstimateWithTruth) -> tuple[dict[str, Any], tuple[str, ..
             values[name] = FIGURES[name](estimate)
             plain(values[name])
             problem = "" if _is_finite(values[name]) else "is not a finite number"
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             problem = f"raises {FIGURES.explain(name, error)}"
         if problem:
             values[name] = None

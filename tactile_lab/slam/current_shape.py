@@ -109,7 +109,7 @@ def present_shape(
         extracted = _extract(field, contact_map, settings, model, origin_height_m, resolution_m)
     except ShapeError:
         return PresentShape(None)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         return PresentShape(None, _warning(model, f"raises {SHAPE_MODELS.explain(model, error)}"))
     problem = _problem(extracted, Contour if settings.dimension == 2 else SurfaceMesh)
     return PresentShape(None, _warning(model, problem)) if problem else PresentShape(extracted)

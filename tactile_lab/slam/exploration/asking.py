@@ -23,7 +23,7 @@ def ask(policy: Policy, candidates: Sequence[Candidate], belief: Belief, rng: np
     try:
         decision = policy.choose(candidates, belief, rng)
         problem = _problem(decision, len(candidates))
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         problem = f"raises {POLICIES.explain(policy.name, error)}"
     if not problem:
         return decision

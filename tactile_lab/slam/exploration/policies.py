@@ -91,7 +91,7 @@ def make_policy(name: str, information: InformationSettings | None = None) -> Po
     try:
         policy = factory()
         own_name = policy.name
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         what = f"the policy {name!r} cannot be made: {POLICIES.explain(name, error)}"
         raise ConfigurationError(what, where=POLICIES.file(name), hint="Correct it, or choose another") from error
     if own_name != name:

@@ -88,7 +88,7 @@ class AddedTracker:
             return question()
         except TactileLabError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise self._failure(f"raises {explain(error, self._file)}") from error
 
     def _check(self, *numbers: Any) -> None:

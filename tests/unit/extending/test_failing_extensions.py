@@ -106,6 +106,7 @@ def session_with(policy: str, folder: Path, decisions: int) -> tuple[DiscWorld, 
     ("answer", "words"),
     [
         ("raise RuntimeError('out of\\n ideas')", r"raises RuntimeError: out of ideas \(line 10\)"),
+        ("raise SystemExit(5)", r"raises SystemExit: 5 \(line 10\)"),
         ("return Decision('mine', 'grasp', 0, (float('nan'),) * len(candidates), 'why')", "answers NaN"),
         pytest.param(
             "return Decision('mine', 'grasp', 0, (0.0,) * len(candidates), 'why', np.nan)",
@@ -180,6 +181,7 @@ def judged(log: Path, out: Path, shape: str | None = None) -> Evaluation:
     ("answer", "words"),
     [
         ("raise ValueError('too few')", r"raises ValueError: too few (line 10)"),
+        ("raise SystemExit(5)", r"raises SystemExit: 5 (line 10)"),
         (
             "return Contour(np.full((9, 2), np.nan), np.ones(9), True)",
             _NOT_FINITE,
@@ -217,6 +219,7 @@ def test_contacts_that_do_not_make_a_shape_are_no_failure_of_its_model(
     ("answer", "words"),
     [
         ("raise KeyError('steps')", "raises KeyError: 'steps' (line 5)"),
+        ("raise SystemExit(5)", "raises SystemExit: 5 (line 5)"),
         ("return float('nan')", "is not a finite number"),
         ("return {'a': 1.0, 'b': [2.0, float('inf')]}", "is not a finite number"),
         ("return object()", "raises TypeError: cannot convert object to plain data"),

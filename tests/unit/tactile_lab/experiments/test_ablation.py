@@ -16,7 +16,7 @@ from tactile_lab.evaluation.spread import Interval
 from tactile_lab.experiments.ablation_page import ablation_page, with_worth
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.data.planar_data import simulate
-from tactile_lab.experiments.runs.ablation_runs import PLANE, SPACE, WITHOUT, WRONG, settings, track_without
+from tactile_lab.experiments.runs.ablation_runs import LEFT, PLANE, SPACE, WITHOUT, WRONG, settings, track_without
 from tactile_lab.experiments.summary import LEFT_OUT, NOTHING, Column, group_runs, paired
 from tactile_lab.slam.shape.fields.settings import GpisSettings, ShapePart
 from tactile_lab.slam.tactile_slam import SlamSettings
@@ -101,11 +101,12 @@ def row(name: str, shape: str, hausdorff_mm: float | None, *, condition: str = P
     return Row(Cell((("condition", condition), ("shape", shape), ("grasps", 4), (LEFT_OUT, name)), 1), figures)
 
 
-def table_of(*losses: float | None) -> list[Row]:
+def table_of(*losses: float | None, condition: str = PLANE) -> list[Row]:
     """Runs with all mechanisms, 1 mm off, and the same without splicing."""
     shapes = [f"shape {number}" for number in range(len(losses))]
-    return [row(NOTHING, shape, 1.0) for shape in shapes] + [
-        row("splicing", shape, None if loss is None else 1.0 + loss) for shape, loss in zip(shapes, losses, strict=True)
+    return [row(NOTHING, shape, 1.0, condition=condition) for shape in shapes] + [
+        row("splicing", shape, None if loss is None else 1.0 + loss, condition=condition)
+        for shape, loss in zip(shapes, losses, strict=True)
     ]
 
 
@@ -139,6 +140,7 @@ def test_the_page_marks_what_is_clear() -> None:
     assert "100 %" in line
     assert "50 %" in line
     assert "`abc`" in page
+    assert "(60 in\nthe long session)" in page
 
 
 def test_the_map_of_the_estimator_is_given_its_column() -> None:
@@ -146,6 +148,12 @@ def test_the_map_of_the_estimator_is_given_its_column() -> None:
     filled = with_worth(text, [*table_of(1.0, 2.0, 2.0, 2.0, 3.0), row(NOTHING, "a", 1.0, condition=WRONG)])
     assert "| splicing | does | **+2.00** / – / – |" in filled
     assert filled.endswith("| other | does | – |")
+
+
+def test_a_mechanism_that_the_usual_conditions_do_not_exercise_is_told_with_its_own() -> None:
+    rows = table_of(0.5, 0.5, 0.5, 0.5, 0.5, condition=LEFT)
+    filled = with_worth("| splicing | does | – |", rows)
+    assert filled == "| splicing | does | **+0.50** left in place |"
 
 
 def test_the_map_of_the_estimator_names_every_mechanism_and_files_that_are_there() -> None:
