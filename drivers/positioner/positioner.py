@@ -155,11 +155,11 @@ class Positioner:
         """Decode one status; None when it repeats the newest one or answers an older command than that.
 
         Raises:
-            CodecError: not a status, or its positions are not numbers.
+            CodecError: not a status, or its positions are not six numbers.
         """
         status = self._codec.decode_status(datagram.payload)
-        if not np.isfinite(status.q).all():
-            raise CodecError("a status without finite positions", where=self._transport.name)
+        if np.shape(status.q) != (6,) or not np.isfinite(status.q).all():
+            raise CodecError("a status without six finite positions", where=self._transport.name)
         behind = _BEGINS_ANEW if self._heard is None else (self._heard - status.sequence) % (LARGEST_SEQUENCE + 1)
         if behind == 0 or (behind < _BEGINS_ANEW and self._heard != QUESTION):
             self._counters.late += behind > 0

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from drivers.core.errors import CodecError, DeviceError
 from drivers.core.transports import Datagram, MemoryTransport, ReplayTransport
 from drivers.positioner.codec import (
     LARGEST_SEQUENCE,
+    PositionerCodec,
     PositionerCommand,
     PositionerStatus,
     decode_command,
@@ -308,6 +310,20 @@ def test_bytes_that_are_no_status_count_as_lost(rig: Rig, garbage: bytes) -> Non
     assert not rig.run(2).fresh
     assert rig.device.counters.malformed == 2
     assert "2 messages were not a positioner status" in rig.device.health()
+
+
+@pytest.mark.parametrize("q", [np.zeros(5), np.zeros((6, 1)), np.zeros(0)])
+def test_another_codec_may_not_give_another_number_of_axes(q: Array) -> None:
+    """As an extension's may: it would be seen only where the positions are used, far from its file."""
+    clock = VirtualClock()
+    codec = PositionerCodec(
+        encode_command, decode_command, encode_status, lambda payload: replace(decode_status(payload), q=q)
+    )
+    device = Positioner(MemoryTransport("base", FakeBase(clock)), clock, codec=codec)
+    with pytest.raises(CodecError, match="base: a status without six finite positions"):
+        device.receive(Datagram(encode_status(PositionerStatus(3, np.zeros(6))), 0))
+    with pytest.raises(DeviceError, match="base: no answer to"):
+        device.connect()
 
 
 def test_a_sound_positioner_has_nothing_to_report(rig: Rig) -> None:
