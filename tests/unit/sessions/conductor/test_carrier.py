@@ -24,7 +24,7 @@ SLIPPERY = Forecast(force_N=1.5, slip_m=0.012, slip_rad=0.2, leans=True)
 class Bench:
     """A carrier with roles that only note what is asked of them."""
 
-    def __init__(self, forecast=FIRM, touching=HELD, may_weigh=True, carry=None, jammed=()):
+    def __init__(self, forecast=FIRM, touching=HELD, may_weigh=True, carry=None, jammed=(), can_weigh=True):
         self.done, self.told, self.logged, self.motions = [], [], [], []
         cycle = SimpleNamespace(
             plan=None,
@@ -37,7 +37,7 @@ class Bench:
             supervisor=SimpleNamespace(count_contacts=lambda count: None),
             performer=cycle,
             decisions=decisions,
-            weigh=lambda touching: self.done.append("weigh") or LiftEnd.HUNG,
+            weigh=(lambda touching: self.done.append("weigh") or LiftEnd.HUNG) if can_weigh else None,
             foretell=lambda grasp, turn, shift: self.done.append("foretell") or forecast,
         )
         properties = SimpleNamespace(in_words=lambda: "mass 300 g")
@@ -87,6 +87,13 @@ def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
     refused = Bench(may_weigh=False).carry(weighed=True)
     assert "weigh" not in refused.done
     assert refused.told == [(Level.INFO, "the object is not weighed")]
+
+
+@pytest.mark.parametrize("may_weigh", [False, True])
+def test_a_session_that_cannot_weigh_carries_all_the_same_and_asks_nobody(may_weigh):
+    bench = Bench(can_weigh=False, may_weigh=may_weigh).carry(weighed=True)
+    assert bench.done == ["foretell", "squeeze", "squeeze", "re-orient", "re-orient"]
+    assert bench.told == []
 
 
 @pytest.mark.parametrize(("remarkable", "told"), [(True, [(Level.WARNING, "the object slipped by 9 mm")]), (False, [])])

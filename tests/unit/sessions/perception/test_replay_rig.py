@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,7 +16,8 @@ from drivers.positioner.positioner import Positioner
 from drivers.shadow.device.hand_samples import HandDecoder
 from drivers.shadow.model.joint_calibration import JointCalibration
 from sessions.perception.replay_rig import recorded_links
-from sessions.recording.traffic.reader import TrafficReader
+from sessions.recording.traffic.reader import TrafficMessage, TrafficReader
+from sessions.recording.traffic.schemas import received_topic, transmitted_topic
 from tactile_lab.rigs.description import load_rig
 from tests.support.repository import LOGS, REPOSITORY
 
@@ -112,6 +114,21 @@ def test_the_guides_example_runs(monkeypatch):
     names = {}
     exec(example, names)  # its own assertions are the test
     assert len(names["link"].sent) == 2
+
+
+def test_a_device_that_never_answered_and_one_that_was_never_asked_are_links_too():
+    said = [
+        TrafficMessage(transmitted_topic("base"), b"where are you?", 1_000, 1_000),
+        TrafficMessage(received_topic("camera"), b"a picture", 5_000, 5_000),
+    ]
+    clock = VirtualClock()
+    links = recorded_links(SimpleNamespace(messages=lambda: iter(said)), clock)
+    assert list(links) == ["base", "camera"]
+    links["base"].send(b"where are you?")
+    assert links["base"].as_then
+    links["camera"].send(b"")
+    clock.sleep_until_ns(4_000)
+    assert [one.payload for one in links["camera"].receive()] == [b"a picture"]
 
 
 @pytest.mark.parametrize("log", ["hand", "base", "ft-ff", "biotac-hand", "camera", "format-1"])

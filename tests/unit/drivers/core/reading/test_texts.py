@@ -52,3 +52,15 @@ def test_json_of_very_many_lists_is_refused_before_it_is_read(monkeypatch):
 def test_what_is_no_json_is_told_without_the_words_of_a_library(content, words):
     with pytest.raises(ValueError, match=f"^{words}$"):
         json_text.parse_json(content)
+
+
+def test_what_is_wrong_in_yaml_is_told_also_where_no_line_is_known():
+    with pytest.raises(yaml.YAMLError) as refused:
+        yaml_text.parse("name: \x07")
+    words = yaml_text.problem_of(refused.value)
+    assert words.startswith("unacceptable character #x0007")
+    assert "\n" not in words
+
+
+def test_an_error_without_words_is_told_by_its_name():
+    assert yaml_text.problem_of(RecursionError()) == "RecursionError"

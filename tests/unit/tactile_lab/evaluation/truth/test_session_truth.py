@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
+from gtsam import Pose3
 
 from drivers.camera.frames import Detection, Frame
 from drivers.camera.packet import encode_packet
@@ -11,7 +15,7 @@ from sessions.perception.interpreter import CAMERA_LINK
 from sessions.recording.session_events import EventKind, SessionEvent
 from sessions.recording.traffic.reader import TrafficMessage
 from sessions.recording.traffic.schemas import SESSION_EVENTS_TOPIC, received_topic
-from tactile_lab.evaluation.truth.session_truth import marked_pictures
+from tactile_lab.evaluation.truth.session_truth import marked_pictures, session_truth
 
 CORNERS_ONLY = encode_packet(Frame(0, np.zeros((2, 2), np.uint8), 1, 0, Detection("DICT_4X4_50", (2, 2), {})))
 
@@ -52,3 +56,19 @@ def test_the_picture_of_a_grasp_is_the_one_its_event_means(
     story: tuple[EventKind | bytes, ...], pictures: dict[int, bytes]
 ) -> None:
     assert seen(*story) == pictures
+
+
+WITHOUT_MESH: Any = SimpleNamespace(truth_mesh=None)
+
+
+def test_a_grasp_without_a_picture_has_no_truth_and_the_others_keep_theirs() -> None:
+    traffic: Any = SimpleNamespace(messages=lambda: messages(BEGIN, END, BEGIN, b"shown", SHOWN, END))
+    seen_at = {b"shown": Pose3()}
+    truth = session_truth(WITHOUT_MESH, 3, lambda picture: seen_at[picture.payload], traffic)
+    assert truth.world_T_object == (None, seen_at[b"shown"], None)
+
+
+def test_without_a_camera_no_pose_is_known() -> None:
+    truth = session_truth(WITHOUT_MESH, 2, None)
+    assert truth.world_T_object == (None, None)
+    assert truth.mesh is None

@@ -17,6 +17,7 @@ from tactile_lab.slam.shape.fields.kernels import (
     covariance,
     cross_covariance_with_gradients,
 )
+from tactile_lab.slam.shape.fields.row_factor import RowFactor
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tests.support.shape_examples import contacts_on_box, contacts_on_polygon, l_block, noisy
 
@@ -111,3 +112,17 @@ def test_rough_variances_are_exact_where_single_precision_would_not_do() -> None
     points, normals = contacts(2, 40)
     field = Gpis.fit(points, normals, point_sigma_m=1e-5, normal_sigma_rad=1e-3)
     assert field.variance(points, rough=True).tolist() == field.variance(points).tolist()
+
+
+def test_a_factor_with_more_rows_is_that_of_the_whole_covariance() -> None:
+    rng = np.random.default_rng(0)
+    root = rng.normal(size=(7, 9))
+    whole, noise = root @ root.T, rng.uniform(0.1, 0.5, 7)
+    noisy_whole = whole + np.diag(noise)
+    first = RowFactor.of(whole[:4, :4].copy(), noise[:4])
+    assert first is not None
+    grown = first.extend(whole[4:, :4], noisy_whole[4:, 4:], np.arange(4), np.arange(4, 7))
+    assert grown is not None
+    right = rng.normal(size=7)
+    assert grown.solve(right) == pytest.approx(np.linalg.solve(noisy_whole, right), rel=1e-6)
+    assert grown.log_determinant == pytest.approx(np.linalg.slogdet(noisy_whole)[1])

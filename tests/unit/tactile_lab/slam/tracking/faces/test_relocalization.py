@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from drivers.core.contacts import Grasp
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.solid_field import SolidField, TabulatedSolid
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
@@ -127,6 +129,36 @@ def test_grasps_that_took_a_wrong_turn_together_are_turned_back_together() -> No
     assert found.cost < right.cost + 0.5
     gaps = prism.space.deviation(found.map.rows[5:9], right.map.rows[5:9])
     assert np.abs(gaps[:, 2]).max() < 0.15
+
+
+class Noting(FacetedScorer):
+    """Notes the maps that it is asked to settle, and finds no faces in any."""
+
+    def __init__(self) -> None:
+        super().__init__(HypothesisScorer(NOISE, 2.0), NOISE)
+        self.asked: list[ContactMap] = []
+
+    def settle(self, contact_map: ContactMap) -> Hypothesis | None:
+        self.asked.append(contact_map)
+        return None
+
+
+def test_a_wrong_turn_is_followed_up_to_a_grasp_that_touched_nothing() -> None:
+    """The grasps before it are tried together at their places, and it stays, as do those after it."""
+    prism = true_map("triangular-prism", count=8, dimension=3)
+    turned = prism
+    for index in (3, 4):
+        turned = moved(turned, index, [0.0, 0.0, 2 * np.pi / 3])
+    missed = ContactSet.of_grasp(Grasp(5, 0, ()), 3, 0.0)
+    turned = turned.with_placed(5, replace(turned.placed[5], contacts_world=missed))
+    sharp = Noting()
+    best = HypothesisScorer(NOISE, 2.0).score(turned)
+    assert Relocalizer(sharp, NOISE, ProposalSettings()).improve(best) is best
+    changed = [np.flatnonzero(np.any(each.rows != turned.rows, axis=1)).tolist() for each in sharp.asked]
+    assert [3, 4] in changed
+    together = sharp.asked[changed.index([3, 4])]
+    gaps = prism.space.deviation(together.rows[3:5], prism.rows[3:5])
+    assert np.abs(gaps[:, 2]).max() < 0.2
 
 
 def test_what_is_round_has_no_other_places() -> None:

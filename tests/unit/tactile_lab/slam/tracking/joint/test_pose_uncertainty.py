@@ -59,6 +59,19 @@ def test_poses_add_to_the_sigma_of_a_surface_and_change_nothing_else(shape: str)
     assert 0.05 < added_mm < 1.0
 
 
+def test_poses_are_in_doubt_from_the_second_grasp_on() -> None:
+    def sigma_m(count: int) -> tuple[Array, Array]:
+        known = true_map("rectangle", count=count)
+        model = GpisShape(known.fit())
+        outline = model.contour(0.004)
+        return outline.sigma_m, propagate_pose_uncertainty(outline, model, known, NOISE).sigma_m
+
+    alone_m, told_alone_m = sigma_m(1)
+    assert told_alone_m.tolist() == alone_m.tolist(), "the first pose defines the object's frame"
+    given_m, told_m = sigma_m(2)
+    assert np.sqrt(np.median(told_m**2 - given_m**2)) > 1e-4
+
+
 @pytest.mark.parametrize("shape", MODELS)
 def test_where_the_object_hardly_slips_poses_add_hardly_anything(shape: str) -> None:
     given, doubtful = doubted(shape, MotionNoise(translation_m=1e-6, rotation_rad=1e-5))
