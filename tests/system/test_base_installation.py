@@ -49,6 +49,7 @@ def test_a_session_is_evaluated_reported_and_exported(session_copy: Path) -> Non
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_bytes_and_contacts_are_estimated_again(session_copy: Path) -> None:
     folder = session_copy.parent
     done = base("session", "replay", session_copy, cwd=folder)
