@@ -35,7 +35,6 @@ def low(x_m: float = 0.003, y_m: float = -0.004, **shape: float) -> Disc:
 PLANS = {
     "pinch after a tap": (low(), GraspPlan(AT, "pinch", 0.022, tap=True)),
     "radial": (low(), GraspPlan(AT, "radial", 0.03)),
-    "aside": (low(radius_m=0.03), GraspPlan(AT, "aside", 0.022)),
     "from the left after a touch": (
         low(radius_m=0.025, height_m=0.15),
         GraspPlan(AT, "pinch-from-left", 0.045, tap=True),
