@@ -11,10 +11,9 @@ from gtsam import Pose2, Pose3, Rot3
 from drivers.core.contacts import FINGERS, Grasp, StepSigma
 from drivers.core.errors import TactileLabError
 from drivers.core.fingertip import TipContact
-from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm_matrix, palm_T_distal_matrices
+from drivers.shadow.model.kinematics import JOINTS
 from sessions.perception.approach_paths import TipSurface, approach_paths
 from sessions.perception.carrying.carry import Carry
-from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.hand_odometry import HandOdometry
 from sessions.perception.perception import PerceptionSettings
@@ -22,6 +21,7 @@ from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.weighing import Dragging, Hanging, dragging, hanging
 from sessions.recording.session_events import EventKind, SessionEvent
 from tests.support.baseline import assert_baseline
+from tests.support.held_samples import POSTURE_rad, held_samples
 from tests.support.session_fakes import (
     FakeBaseSample,
     FakeFrame,
@@ -31,7 +31,6 @@ from tests.support.session_fakes import (
     play_session,
 )
 
-POSTURE_rad = np.where([name.endswith("J3") for name in JOINTS], 0.9, 0.2)
 ALMOST = {"rtol": 1e-5, "atol": 1e-9}
 
 
@@ -120,25 +119,6 @@ def test_motions_of_the_hand_between_grasps() -> None:
     assert_baseline("sessions/perception/odometry", {"told": told})
 
 
-def held_samples(pull_N: float = 0.0, upward_N: float = 3.0, tilted: float = 0.0) -> CarrySamples:
-    """A hand that moves to and fro along x, its fingers carrying a weight and dragging against a pull."""
-    count = 41
-    aside_m = 0.005 * np.interp(np.arange(count), [0, 10, 30, 40], [0.0, 1.0, -1.0, 0.0])
-    speed = np.sign(np.gradient(aside_m)) * (0.7 + 0.3 * np.sin(np.arange(count)))
-    joints, forearms = np.tile(POSTURE_rad, (count, 1)), np.tile(np.eye(4), (count, 1, 1))
-    forearms[:, 0, 3], forearms[:, 1, 3] = aside_m, tilted * aside_m
-    frames = (forearms @ forearm_T_palm_matrix(joints, "right"))[:, None] @ palm_T_distal_matrices(joints, "right")
-    readings = np.zeros((count, 5, 6))
-    for n in range(count):
-        place = np.array([0.4 + aside_m[n], -0.02, 0.05])
-        for at, finger in enumerate(FINGERS):
-            squeeze = np.array([0.0, 2.0, 0.0]) if finger == "TH" else np.array([0.0, -0.5, 0.0])
-            on_tip = -(squeeze + np.array([speed[n] * pull_N, 0.0, upward_N]) / 5)
-            rotation, origin = frames[n, at, :3, :3], frames[n, at, :3, 3]
-            readings[n, at] = [*(rotation.T @ on_tip), *(rotation.T @ np.cross(place - origin, on_tip))]
-    return CarrySamples(1e7 * np.arange(count), joints, forearms, readings)
-
-
 class Scale:
     """A fingertip whose readings are wrenches."""
 
@@ -151,11 +131,11 @@ class Scale:
 def test_what_hangs_and_what_is_dragged() -> None:
     tips, told = {finger: Scale() for finger in FINGERS}, {}
     made = {
-        "free": held_samples(),
-        "held back": held_samples(0.5),
-        "hardly held back": held_samples(0.1),
-        "light": held_samples(0.0, 0.04),
-        "diagonally": held_samples(0.3, 2.0, 0.8),
+        "free": held_samples(0.0, 3.0, uneven=0.3),
+        "held back": held_samples(0.5, 3.0, uneven=0.3),
+        "hardly held back": held_samples(0.1, 3.0, uneven=0.3),
+        "light": held_samples(0.0, 0.04, uneven=0.3),
+        "diagonally": held_samples(0.3, 2.0, tilted=0.8, uneven=0.3),
     }
     for name, samples in made.items():
         found = hanging(samples, tips, "right", 0.01, 0.05)  # type: ignore[arg-type]

@@ -13,20 +13,9 @@ from drivers.core.errors import CodecError
 from drivers.emulators.ur.control_box import ControlBox, Series
 from drivers.emulators.ur.rtde_server import RtdeClient, package
 from drivers.positioner.ur.poses import tcp_of
+from tests.support.carried_forearm import PROGRAM, Forearm
 
-PROGRAM = 'def program():\n  textmsg("RTDE Control Script Loaded")\nend\n'
 FLANGE_T_FOREARM = Pose3(Rot3.Yaw(1.5), np.array([0.0, 0.0, 0.06]))
-
-
-class Forearm:
-    def __init__(self) -> None:
-        self.pose = Pose3(Rot3.Pitch(0.3), np.array([0.5, 0.1, 0.4]))
-
-    def place(self) -> Pose3:
-        return self.pose
-
-    def move(self, base_T_forearm: Pose3) -> None:
-        self.pose = base_T_forearm
 
 
 class Bench:

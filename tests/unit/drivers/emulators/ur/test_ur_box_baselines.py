@@ -12,25 +12,14 @@ from drivers.core.clock import VirtualClock
 from drivers.emulators.ur.control_box import EVENTS, ControlBox, Series
 from drivers.emulators.ur.rtde_server import RtdeClient, package, type_of
 from tests.support.baseline import assert_baseline
+from tests.support.carried_forearm import PROGRAM, Forearm
 from tests.support.plain_values import plain
 
-PROGRAM = 'def program():\n  textmsg("RTDE Control Script Loaded")\nend\n'
 OUTPUTS = (
     "timestamp", "actual_TCP_pose", "actual_TCP_force", "payload", "speed_scaling", "target_speed_fraction",
     "robot_status_bits", "robot_mode", "safety_status_bits", "runtime_state", "output_int_register_0",
     "output_double_register_3",
 )  # fmt: skip
-
-
-class Forearm:
-    def __init__(self) -> None:
-        self.pose = Pose3(Rot3.Pitch(0.3), np.array([0.5, 0.1, 0.4]))
-
-    def place(self) -> Pose3:
-        return self.pose
-
-    def move(self, base_T_forearm: Pose3) -> None:
-        self.pose = base_T_forearm
 
 
 @pytest.mark.parametrize("series", ["e", "cb3"])

@@ -10,18 +10,17 @@ import pytest
 from drivers.core.contacts import FINGERS
 from drivers.core.errors import SessionError
 from drivers.core.fingertip import GRAVITY
-from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm_matrix, palm_T_distal_matrices
-from sessions.perception.carrying.carry_record import CarrySamples
+from drivers.shadow.model.kinematics import JOINTS
 from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.carrying.net_wrench import upward_N
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
 from sessions.perception.weighing.weighing import Dragging, dragging, hanging
 from sessions.recording.session_events import EventKind, SessionEvent
+from tests.support.held_samples import CENTRE_m, HEIGHT_m, held_samples
 
-MASS_kg, CENTRE_m, HEIGHT_m = 0.3, np.array([0.4, -0.02]), 0.05
+MASS_kg = 0.3
 JOINT_SIGMA_rad = float(np.radians(0.6))
-POSTURE_rad = np.where([name.endswith("J3") for name in JOINTS], 0.9, 0.2)
 
 
 class PlainTip:
@@ -42,28 +41,8 @@ class PlainTip:
 TIPS = {finger: PlainTip() for finger in FINGERS}
 
 
-def held_samples(pull_N=0.0, upward_N=MASS_kg * GRAVITY, centre_m=CENTRE_m):
-    """A hand that moves to and fro along x, its fingers carrying a weight at a centre and dragging against a pull."""
-    count = 41
-    aside_m = 0.005 * np.interp(np.arange(count), [0, 10, 30, 40], [0.0, 1.0, -1.0, 0.0])
-    speed = np.sign(np.gradient(aside_m))
-    joints = np.tile(POSTURE_rad, (count, 1))
-    forearms = np.tile(np.eye(4), (count, 1, 1))
-    forearms[:, 0, 3] = aside_m
-    frames = (forearms @ forearm_T_palm_matrix(joints, "right"))[:, None] @ palm_T_distal_matrices(joints, "right")
-    readings = np.zeros((count, 5, 6))
-    for n in range(count):
-        place = np.array([centre_m[0] + aside_m[n], centre_m[1], HEIGHT_m])
-        for at, finger in enumerate(FINGERS):
-            squeeze = np.array([0.0, 2.0, 0.0]) if finger == "TH" else np.array([0.0, -0.5, 0.0])
-            on_tip = -(squeeze + np.array([speed[n] * pull_N, 0.0, upward_N]) / 5)
-            rotation, origin = frames[n, at, :3, :3], frames[n, at, :3, 3]
-            readings[n, at] = [*(rotation.T @ on_tip), *(rotation.T @ np.cross(place - origin, on_tip))]
-    return CarrySamples(1e7 * np.arange(count), joints, forearms, readings)
-
-
 def test_what_hangs_free_is_weighed_and_its_centre_found():
-    found = hanging(held_samples(), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+    found = hanging(held_samples(0.0, MASS_kg * GRAVITY), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
     assert found.weight_N == pytest.approx(MASS_kg * GRAVITY, abs=1e-9)
     np.testing.assert_allclose(found.centre_m, CENTRE_m, atol=1e-9)
     assert found.held_back_N == pytest.approx(0.0, abs=1e-9)
@@ -73,7 +52,7 @@ def test_what_hangs_free_is_weighed_and_its_centre_found():
 
 
 def test_joint_angles_that_are_wrong_by_what_is_stated_stay_within_the_stated_error():
-    true, rng = held_samples(), np.random.default_rng(1)
+    true, rng = held_samples(0.0, MASS_kg * GRAVITY), np.random.default_rng(1)
     off = []
     for _ in range(20):
         wrong = replace(true, joints_rad=true.joints_rad + rng.normal(0.0, JOINT_SIGMA_rad, len(JOINTS)))
@@ -95,7 +74,7 @@ def test_friction_of_the_table_is_half_the_difference_between_to_and_fro():
 
 
 def test_a_fingertip_without_a_reading_counts_for_nothing():
-    samples = held_samples()
+    samples = held_samples(0.0, MASS_kg * GRAVITY)
     samples.readings[:, 0] = np.nan
     assert hanging(samples, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m).weight_N == pytest.approx(0.8 * MASS_kg * GRAVITY)
 
@@ -109,7 +88,7 @@ def test_the_upward_force_now_is_that_of_the_newest_readings():
 def known():
     found = ObjectProperties()
     found.draggings.append((0, Dragging(1.05, 0.05, 0.06)))
-    found.hangings.append((1, hanging(held_samples(), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)))
+    found.hangings.append((1, hanging(held_samples(0.0, MASS_kg * GRAVITY), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)))
     found.sliding.append((1, np.linspace(0.5, 0.9, 100)))
     return found
 
