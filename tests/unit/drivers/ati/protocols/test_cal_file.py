@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.ati.protocols import cal_file
-from drivers.ati.wiring import VoltsWiring
 from drivers.core.errors import ConfigurationError
-from drivers.fingertips.wiring import make_wire
 
 AXIS = '<Axis Name="{n}" values="{v}" max="12" scale="2"/>'
 SENSOR = """<FTSensor Serial="FT1" Family="DAQ" CalFileVersion="1.0">
@@ -122,11 +120,3 @@ def test_a_missing_or_huge_file_is_refused(tmp_path: Path) -> None:
         cal_file.load(tmp_path / "none.cal")
     with pytest.raises(ConfigurationError, match="too large"):
         cal_file.load(write(tmp_path / "big.cal", " " * (1 << 20) + "<a/>"))
-
-
-def test_a_calibration_of_another_sensor_than_the_one_plugged_in_is_refused(lab_data: Path) -> None:
-    file = next(path for path in sorted((lab_data / "ati_cal").glob("*.cal")) if "FT14048" in path.name)
-    wiring = {"wire": "gauge-volts", "calibration": file.name, "local_port": 45000}
-    make_wire(VoltsWiring.model_validate(wiring | {"serial": "FT14048"}), file.parent)
-    with pytest.raises(ConfigurationError, match="is the calibration of FT14048, but the sensor is FT99999"):
-        make_wire(VoltsWiring.model_validate(wiring | {"serial": "FT99999"}), file.parent)

@@ -11,8 +11,9 @@ import pytest
 from tactile_lab.cli.main import main
 from tactile_lab.experiments.results.page_ages import ASK, OLDER, answer, answer_overview
 from tactile_lab.experiments.results.publishing import ages, make_pages, publish, stored_results
+from tests.support.repository import REPOSITORY
 
-DOCS = Path(__file__).resolve().parents[4] / "docs"
+DOCS = REPOSITORY / "docs"
 BY_HAND = {"ablation", "machine", "mutants"}
 RENEW = "run 'make results' (tactile-lab experiment pages) and commit what it writes"
 
