@@ -94,8 +94,13 @@ def simulate(
         ConfigurationError: there is no such solid, or its mesh is not on this machine.
     """
     rng = np.random.default_rng([seed, 31607, round(1000 * motion_scale), ("table", "free").index(motion)])
-    on_table = _OnTable if heights == "three" else _AtAllHeights
+    on_table = _OnTable if heights == "three" else SessionAtAllHeights
     session = (on_table if motion == "table" else _InSpace)(solid(shape), motion_scale, rng)
+    return gather(shape, session, count, outlier_share)
+
+
+def gather(shape: str, session: Session, count: int, outlier_share: float = 0.0) -> SpatialGrasps:
+    """The grasps of a session, one after the other; the object's frame is born at the first one's contacts."""
     grasps: list[Grasp] = []
     truth: list[Pose3] = []
     hand_motion = Pose3()
@@ -136,7 +141,7 @@ def random_contacts(shape: str, count: int, seed: int, *, foot: bool = False) ->
     return SpatialGrasps(shape, grasps, (pose,) * len(grasps), body.mesh)
 
 
-class _Session:
+class Session:
     """One solid, its true pose and that of the palm; subclasses draw the different kinds of motion."""
 
     floor_m: float = -np.inf
@@ -219,7 +224,7 @@ class _Session:
         return np.asarray(start + length * way)
 
 
-class _OnTable(_Session):
+class _OnTable(Session):
     """Poses (x, y, yaw) on the table."""
 
     floor_m = _TABLE_CLEARANCE_m
@@ -262,7 +267,7 @@ class _OnTable(_Session):
         self.world_T_palm = spatial(planar_pose(place, self._rng.normal(0.0, 0.1)), _REACH_m)
 
 
-class _AtAllHeights(_OnTable):
+class SessionAtAllHeights(_OnTable):
     """The same, with grasps over the whole height."""
 
     def levels_m(self, index: int) -> Array:
@@ -273,7 +278,7 @@ class _AtAllHeights(_OnTable):
         return np.asarray(middle + self._rng.uniform(-breadth, breadth, 5))
 
 
-class _InSpace(_Session):
+class _InSpace(Session):
     """Poses with all six degrees of freedom."""
 
     def __init__(self, body: Solid, scale: float, rng: np.random.Generator) -> None:

@@ -19,7 +19,9 @@ from tactile_lab.experiments.cells import Cell, Row, Setting, grid
 from tactile_lab.experiments.data import left_in_place, planar_data, spatial_data
 from tactile_lab.experiments.data.carried_off import carried_off
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
+from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.run_metrics import slam_figures
+from tactile_lab.experiments.touched_metrics import touched_figures
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 
 Overlay: TypeAlias = Mapping[str, Mapping[str, Any]]
@@ -27,7 +29,7 @@ _Result = TypeVar("_Result")
 
 NOTHING = "nothing"
 PLANE, WRONG, CARRIED, LONG, SPACE = "in the plane", "wrong contacts", "carried off", "long session", "in space"
-LEFT = "left in place"
+LEFT, THINGS = "left in place", "everyday things"
 SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         PLANE: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
@@ -36,9 +38,12 @@ SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         LEFT: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         LONG: ("L", "ellipse"),
         SPACE: ("box-12x6x6", "triangular-prism", "ellipsoid", "cylinder", "hexagonal-prism", "l-block"),
+        THINGS: ("cup", "cup-with-handle", "tin", "wedge", "hammer", "t-block"),
     }
 )
-GRASPS: Mapping[str, int] = MappingProxyType({PLANE: 12, WRONG: 12, CARRIED: 12, LEFT: 12, LONG: 60, SPACE: 12})
+GRASPS: Mapping[str, int] = MappingProxyType(
+    {PLANE: 12, WRONG: 12, CARRIED: 12, LEFT: 12, LONG: 60, SPACE: 12, THINGS: 12}
+)
 CARRIED_BEFORE, FARTHEST_m = 8, 0.15
 """Grasp before which somebody puts the object elsewhere, and by how much at most per axis; it is also turned."""
 UNHELD = 0.15
@@ -66,6 +71,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "splicing": _joint("splicing"),
         "relocation": _joint("relocation"),
         "pushes": _joint("pushes"),
+        "surprises": _joint("surprises"),
         "deferred association": _joint("deferred association"),
         "faces": _joint("faces"),
         "doubts": _joint("doubts"),
@@ -105,10 +111,30 @@ _IN_SPACE_ONLY = (
 )
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
-_LEFT_ONLY = ("pushes",)
-_LONG_TOO = (NOTHING, "fixed lag")
-_CARRIED_TOO = (NOTHING, "relocation", "deferred association", "backward reading")
-_LEFT_TOO = (NOTHING, "pushes", "deferred association")
+_LEFT_ONLY = ("pushes", "surprises")
+_FEW: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        LONG: (NOTHING, "fixed lag"),
+        CARRIED: (NOTHING, "relocation", "deferred association", "backward reading"),
+        LEFT: (NOTHING, "pushes", "deferred association"),
+        THINGS: (
+            NOTHING,
+            "pushes",
+            "surprises",
+            "contradictions",
+            "held-out contacts",
+            "field",
+            "polyhedron",
+            "prism",
+            "turned",
+            "standing field",
+            "sections",
+            "parts",
+            "strays",
+        ),
+    }
+)
+"""What is left out in conditions that were made for some mechanisms."""
 _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         name: frozenset({name, *further})
@@ -116,6 +142,7 @@ _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
             "splicing": (),
             "relocation": ("deferred association",),
             "pushes": ("deferred association",),
+            "surprises": (),
             "deferred association": (),
             "doubts": (),
             "without one": (),
@@ -149,8 +176,8 @@ def settings(grasps: int) -> list[Setting]:
 
 
 def _left_out_in(condition: str) -> list[str]:
-    if (few := {LONG: _LONG_TOO, CARRIED: _CARRIED_TOO, LEFT: _LEFT_TOO}.get(condition)) is not None:
-        return list(few)
+    if condition in _FEW:
+        return list(_FEW[condition])
     impossible = (*_LONG_ONLY, *_LEFT_ONLY, *(_IN_PLANE_ONLY if condition == SPACE else _IN_SPACE_ONLY))
     return [name for name in WITHOUT if name not in impossible]
 
@@ -186,6 +213,8 @@ def _data(condition: str, shape: str, grasps: int, seed: int) -> SimulatedGrasps
         return spatial_data.simulate(shape, seed, count=grasps)
     if condition == LEFT:
         return left_in_place.simulate(shape, seed, count=grasps)
+    if condition == THINGS:
+        return left_in_place.simulate_thing(shape, seed, count=grasps)
     data = planar_data.simulate(shape, seed, count=grasps, outlier_share=0.1 if condition == WRONG else 0.0)
     return carried_off(data, CARRIED_BEFORE, _jump(seed)) if condition == CARRIED else data
 
@@ -197,15 +226,22 @@ def _jump(seed: int) -> Pose3:
 
 
 def _tracked(data: SimulatedGrasps, overlay: Overlay, cell: Cell) -> tuple[dict[str, Any], frozenset[str]]:
-    given = {"dimension": 3 if cell["condition"] == SPACE else 2, **overlay}
-    if cell["condition"] == LEFT:
+    given = {"dimension": 3 if cell["condition"] in (SPACE, THINGS) else 2, **overlay}
+    if cell["condition"] in (LEFT, THINGS):
         given["motion"] = {"unheld": UNHELD}
     slam = TactileSlam(SlamSettings.model_validate(given), cell.seed)
     steps_ms = [_processor_ms(partial(slam.add_grasp, grasp))[0] for grasp in data.grasps]
     finish_ms, result = _processor_ms(slam.finish)
     figures = {**slam_figures(data, result), "step_ms": steps_ms[1:], "finish_ms": finish_ms}
+    if isinstance(data, SpatialGrasps) and cell["condition"] == THINGS:
+        figures |= _where_touched(touched_figures(data, result))
     figures["failed"] = float(bool(Row(cell, figures).failure))
     return figures, slam.mechanisms_that_acted
+
+
+def _where_touched(touched: Mapping[str, Any]) -> dict[str, Any]:
+    """Figures of the shape near the contacts, in place of those of all of it: much of a thing is never touched."""
+    return {key: touched[f"touched_{key}"] for key in ("hausdorff_mm", "within_2_sigma")}
 
 
 def _processor_ms(work: Callable[[], _Result]) -> tuple[float, _Result]:
