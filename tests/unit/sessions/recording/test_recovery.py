@@ -6,6 +6,7 @@ import time
 from datetime import UTC, datetime
 
 import pytest
+from mcap.reader import make_reader
 
 from drivers.core.errors import SessionError, WriteError
 from sessions.recording import recovery
@@ -74,19 +75,41 @@ def test_a_session_that_was_only_not_closed_is_recovered_without_loss(tmp_path):
     assert summarize(recovery.folder).status == "recovered"
 
 
-def test_a_damaged_part_is_told_by_topic(tmp_path):
-    folder = record(tmp_path)
+def largest_chunk(folder):
+    """Where it begins, and how long it and the index behind it are; time and the machine's pace end chunks."""
+    with (folder / "traffic.mcap").open("rb") as file:
+        chunks = make_reader(file).get_summary().chunk_indexes
+    chunk = max(chunks, key=lambda each: each.chunk_length)
+    return chunk.chunk_start_offset, chunk.chunk_length, chunk.message_index_length
+
+
+def overwrite(folder, place):
     traffic = folder / "traffic.mcap"
     content = bytearray(traffic.read_bytes())
-    middle = len(content) // 2
-    content[middle : middle + 20] = bytes(20)
+    content[place : place + 20] = bytes(20)
     traffic.write_bytes(content)
+
+
+def test_a_damaged_part_is_told_by_topic(tmp_path):
+    folder = record(tmp_path)
+    begin, length, _ = largest_chunk(folder)
+    overwrite(folder, begin + length // 2)
     recovery = recover(folder)
     hand, tip = recovery.topics["/link/hand/rx"], recovery.topics["/link/ft/FF/rx"]
     assert hand.read + hand.lost == COUNT
     assert tip.read + tip.lost == COUNT // 2
     assert hand.lost > 0
     assert read_manifest(recovery.folder).data_loss["lost /link/hand/rx"] == hand.lost
+
+
+def test_a_damaged_index_costs_no_message(tmp_path):
+    folder = record(tmp_path)
+    begin, length, index = largest_chunk(folder)
+    overwrite(folder, begin + length + index // 2)
+    recovery = recover(folder)
+    assert recovery.folder is None
+    assert not recovery.lossy
+    assert numbers(folder, "/link/hand/rx") == list(range(COUNT))
 
 
 def test_a_whole_session_needs_no_recovery(tmp_path):
