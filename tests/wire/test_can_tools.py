@@ -12,8 +12,10 @@ from pathlib import Path
 import can
 import pytest
 
+from drivers.emulators.ethercat.motor_can import VERSION
 from drivers.emulators.ethercat.server import EmulatedHandProcess
-from drivers.shadow.ethercat.bootloader import bootloader_versions
+from drivers.shadow.ethercat.bootloader import bootloader_version
+from drivers.shadow.protocol.palm_codec import MOTORS
 from tests.support.ethercat_wire import JOINTS, cable
 from tests.support.interruptible import interruptible
 
@@ -30,7 +32,7 @@ def tool(name: str, interface: str, *words: str) -> list[str]:
 
 def test_all_bootloaders_answer_over_the_wire(ends: tuple[str, str]) -> None:
     with EmulatedHandProcess(ends[1], JOINTS), can.Bus(interface="shadow_bridge", channel=ends[0]) as bus:
-        assert None not in bootloader_versions(bus, tries=3).values()
+        assert {bootloader_version(bus, motor, tries=3) for motor in range(MOTORS)} == {VERSION}
 
 
 def test_the_player_plays_a_log_onto_the_buses(ends: tuple[str, str], tmp_path: Path) -> None:

@@ -9,7 +9,6 @@ import can
 
 from drivers.core.errors import DeviceError
 from drivers.shadow.protocol.motor_can import BootCommand, Direction, MotorIdentifier, bus_of
-from drivers.shadow.protocol.palm_codec import MOTORS
 
 ANSWER_s = 0.1
 TRIES = 20
@@ -38,14 +37,3 @@ def bootloader_version(bus: can.BusABC, motor: int, tries: int = TRIES) -> bytes
                 return bytes(answer.data)
     hint = "Only a motor in its bootloader answers; check that it has power"
     raise DeviceError(f"motor {motor} does not report its bootloader's version", where=f"motor bus {wire}", hint=hint)
-
-
-def bootloader_versions(bus: can.BusABC, tries: int = 1) -> dict[int, bytes | None]:
-    """Versions of all motors, None for those that do not answer."""
-    versions: dict[int, bytes | None] = {}
-    for motor in range(MOTORS):
-        try:
-            versions[motor] = bootloader_version(bus, motor, tries)
-        except DeviceError:
-            versions[motor] = None
-    return versions
