@@ -36,8 +36,8 @@ class Distortion:
 
     def distorted(self, points: Array) -> Array:
         """Where points (n, 2) at a distance of one appear, shape (n, 2)."""
-        bent = points * self._factor(_r2(points))[:, None] + self._shift(points)
-        return self._onto_sensor(bent, self._tilt)
+        factor, shift = self._bending(points)
+        return self._onto_sensor(points * factor + shift, self._tilt)
 
     def slopes(self, points: Array) -> Array:
         """Derivatives of :meth:`distorted` with respect to the points, shape (n, 2, 2)."""
@@ -66,17 +66,25 @@ class Distortion:
         if self._tilt is not None:
             wanted = self._onto_sensor(wanted, np.asarray(np.linalg.inv(self._tilt), float))
         points = wanted.copy()
-        moving = np.arange(len(points)) if any(self.given) else np.arange(0)
+        if not any(self.given):
+            return points
+        moving, aim, now = np.arange(len(points)), wanted, points
+        factor, shift = self._bending(now)
         for _ in range(_ROUNDS):
-            now = points[moving]
-            factor = self._factor(_r2(now))[:, None]
-            points[moving] = np.where(factor > 0.0, (wanted[moving] - self._shift(now)) / factor, wanted[moving])
-            seen_px = self.distorted(points[moving]) * focal_px + centre_px
-            far = np.linalg.norm(seen_px - pixels[moving], axis=1) >= _ENOUGH_px
-            moving = moving[far & (factor[:, 0] > 0.0)]
+            now = np.where(factor > 0.0, (aim - shift) / factor, aim)
+            points[moving], right = now, factor[:, 0] > 0.0
+            factor, shift = self._bending(now)
+            beside_px = self._onto_sensor(now * factor + shift, self._tilt) * focal_px + centre_px - pixels[moving]
+            far = np.sqrt(beside_px[:, 0] ** 2 + beside_px[:, 1] ** 2) >= _ENOUGH_px
+            keep = far & right
+            moving, aim, factor, shift = moving[keep], aim[keep], factor[keep], shift[keep]
             if not len(moving):
                 break
         return points
+
+    def _bending(self, points: Array) -> tuple[Array, Array]:
+        """What points (n, 2) are multiplied with, shape (n, 1), and what is added then, shape (n, 2)."""
+        return self._factor(_r2(points))[:, None], self._shift(points)
 
     @cached_property
     def _all(self) -> tuple[float, ...]:
@@ -97,12 +105,19 @@ class Distortion:
 
     def _shift(self, points: Array) -> Array:
         """What is added to points (n, 2) after their multiplication."""
+        if not self._shifts:
+            return np.zeros_like(points)
         _, _, p1, p2, _, _, _, _, s1, s2, s3, s4, _, _ = self._all
         x, y = points.T
         r2, crosswise = _r2(points), 2 * x * y
         across = p1 * crosswise + p2 * (r2 + 2 * x * x) + (s1 + s2 * r2) * r2
         down = p1 * (r2 + 2 * y * y) + p2 * crosswise + (s3 + s4 * r2) * r2
         return np.stack([across, down], axis=1)
+
+    @cached_property
+    def _shifts(self) -> bool:
+        """Whether the lens does more than multiply."""
+        return any(self._all[2:4]) or any(self._all[8:12])
 
     @cached_property
     def _tilt(self) -> Array | None:

@@ -14,9 +14,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
+from tests.support.plain_values import plain
 from tests.support.repository import REPOSITORY
 
 FOLDER = REPOSITORY / "tests" / "baseline"
@@ -32,12 +32,12 @@ def assert_baseline(name: str, values: Mapping[str, Any], *, rtol: float = 1e-6,
 
     Args:
         name: of the file, with its folder: "tracking/motion_cost".
-        values: numbers, arrays, texts, truth values, None, and lists and mappings of them. Whole numbers and texts have
-            to be the same.
+        values: what :func:`tests.support.plain_values.plain` makes numbers, texts, lists and mappings of. Whole numbers
+            and texts have to be the same.
         rtol, atol: a number may differ by ``atol + rtol * |stored|``, times what the environment's BASELINE_SHARE says.
     """
     _asked.add(f"{name}.json")
-    file, now = FOLDER / f"{name}.json", _plain(values)
+    file, now = FOLDER / f"{name}.json", _rounded(plain(values))
     stored = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     share = float(os.environ.get(_SHARE, "1"))
     moved = list(differences(stored, now, share * rtol, share * atol))
@@ -47,13 +47,6 @@ def assert_baseline(name: str, values: Mapping[str, Any], *, rtol: float = 1e-6,
     elif moved:
         hint = "If that is meant, `python -m tests.support.baseline` stores the new ones; the commit says why."
         pytest.fail(f"{len(moved)} values of {name} have moved:\n{_shown(moved)}\n{hint}", pytrace=False)
-
-
-def digest(array: Any) -> list[float]:
-    """Sums that stand for an array of many numbers: of the squares, and three weighted differently."""
-    flat = np.asarray(array, dtype=float).ravel()
-    weights = np.cos(np.outer([0.7, 1.9, 2.3], np.arange(len(flat))))
-    return [float(np.sqrt(flat @ flat)), *(weights @ flat)]
 
 
 def differences(stored: Any, now: Any, rtol: float = 0.0, atol: float = 0.0, where: str = "") -> Iterator[str]:
@@ -71,18 +64,14 @@ def differences(stored: Any, now: Any, rtol: float = 0.0, atol: float = 0.0, whe
         yield f"{where.lstrip('.')}: {stored} stored, {now} now"
 
 
-def _plain(value: Any) -> Any:
-    """A value as JSON gives it back, floats rounded to what is worth storing."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, set | frozenset):
-        return sorted(_plain(item) for item in value)
-    if isinstance(value, float):
+def _rounded(value: Any) -> Any:
+    """A plain value as JSON gives it back, floats rounded to what is worth storing."""
+    if type(value) is float:
         return float(f"{value:.{_DIGITS}g}") + 0.0 if math.isfinite(value) else value
+    if isinstance(value, dict):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_rounded(item) for item in value]
     assert value is None or isinstance(value, bool | int | str), f"{type(value).__name__} cannot be stored"
     return value
 

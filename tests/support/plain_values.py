@@ -1,4 +1,4 @@
-"""Whole results as plain values, for baselines: every public field and property of what a function returns."""
+"""Values as numbers, texts, lists and mappings, for baselines: of a whole result every public field and property."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ import gtsam
 import numpy as np
 from pydantic import BaseModel
 
+_PLAIN = frozenset({float, int, str, bool, type(None)})
+
 
 def plain(value: Any) -> Any:
     """A value as numbers, texts, lists and mappings.
@@ -21,12 +23,14 @@ def plain(value: Any) -> Any:
     Poses become their matrices, enumerations their names. Of an object come its public fields, what its properties
     say, and its words if it has any for people. Unknowns of a solver, functions and paths are left out: None.
     """
+    if type(value) in _PLAIN:
+        return value
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, set | frozenset):
-        return sorted(map(plain, value))
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
+    if isinstance(value, set | frozenset):
+        return sorted(map(plain, value))
     if isinstance(value, BaseModel) or (dataclasses.is_dataclass(value) and not isinstance(value, type)):
         return _contents(value)
     return _single(value)
@@ -66,13 +70,3 @@ def _is_default(value: Any, name: str) -> bool:
         return False
     defaults = {field.name: field.default for field in dataclasses.fields(value)}
     return dataclasses.is_dataclass(defaults.get(name)) and getattr(value, name) is defaults[name]
-
-
-def condensed(values: Any) -> list[float]:
-    """How many numbers, their sum, and two sums with weights that tell which one changed places or sign."""
-    flat = np.asarray(values, float).ravel()
-    places = np.arange(len(flat))
-    return [
-        float(len(flat)),
-        *(float(np.sum(weights * flat)) for weights in (1.0, np.cos(places), np.sin(1.7 * places))),
-    ]

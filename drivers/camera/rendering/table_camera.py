@@ -9,7 +9,7 @@ between z = -thickness and z = 0; above it a ray continues in its old direction,
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -21,6 +21,7 @@ from drivers.camera.opencv import cv2
 from drivers.camera.rendering.settings import CameraSettings
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
+from drivers.core.fingertip import RigidTransform
 from drivers.core.poses import rotate, transform_points
 
 Image = NDArray[np.uint8]
@@ -99,13 +100,12 @@ class TableCamera:
         across = np.linalg.norm(seen[:, :2], axis=1)
         direction = seen[:, :2] / np.maximum(across, 1e-9)[:, None]
         apparent = points_world_m.copy()
-        apparent[:, :2] += direction * self._glass_shift_m(across / seen[:, 2])[:, None]
+        apparent[:, :2] += direction * _glass_shift_m(across / seen[:, 2], *self._glass)[:, None]
         return self._lens.project(transform_points(self._pose.inverse(), apparent))
 
-    def _glass_shift_m(self, tangent: Array) -> Array:
-        """Sideways shift of a ray by the glass, from the tangent of its angle to the vertical."""
-        sine = tangent / np.sqrt(1 + tangent**2) / self._settings.glass_index
-        return np.asarray(self._settings.glass_thickness_m * (tangent - sine / np.sqrt(1 - sine**2)))
+    @property
+    def _glass(self) -> tuple[float, float]:
+        return self._settings.glass_thickness_m, self._settings.glass_index
 
     def _draw_foot(self, picture: _Picture, foot_world_m: Array) -> None:
         corners = np.rint(self.project(foot_world_m) * 16).astype(np.int32)  # sixteenths of a pixel
@@ -145,23 +145,6 @@ class TableCamera:
         radius = np.hypot(columns - width / 2, rows - height / 2) / (width / 2)
         return np.asarray(1 - _VIGNETTING * radius**2, np.float32)
 
-    @cached_property
-    def _rays(self) -> tuple[Array, Array]:
-        """Each pixel's ray above the table: its point at z = 0, and its direction per metre of height.
-
-        Both have shape (height, width, 3), world frame.
-        """
-        width, height = self._size_px
-        pixels = np.stack(np.meshgrid(np.arange(float(width)), np.arange(float(height))), axis=-1).reshape(-1, 2)
-        rays = rotate(self._pose, self._lens.rays(pixels))
-        slope = rays[:, :2] / rays[:, 2:]
-        tangent = np.linalg.norm(slope, axis=1)
-        glass_m = self._glass_shift_m(tangent) / np.maximum(tangent, 1e-9)
-        centre_m = self._pose.translation()
-        ground_m = centre_m[:2] - slope * (centre_m[2] + glass_m[:, None])
-        up = np.ones((len(rays), 1))
-        return np.hstack([ground_m, 0 * up]).reshape(height, width, 3), np.hstack([slope, up]).reshape(height, width, 3)
-
     def _hits(self, world_T_marker: Pose3, window: tuple[slice, slice]) -> tuple[Array, Array]:
         """Intersections of a window's rays with the marker's plane: marker x and y, metres, for every ray of every
         pixel.
@@ -169,13 +152,40 @@ class TableCamera:
         The intersection is computed at pixel centres and interpolated between them, since it changes smoothly.
         """
         rotation = world_T_marker.rotation().matrix()
-        ground_m, slopes = self._rays
+        ground_m, slopes = _rays_above(self._lens, self._settings.world_T_camera, *self._glass)
         start = (ground_m[window] - world_T_marker.translation()) @ rotation
         slope = slopes[window] @ rotation
         crossing = start[..., :2] - slope[..., :2] * (start[..., 2:] / slope[..., 2:])
         size = (_RAYS * crossing.shape[1], _RAYS * crossing.shape[0])
         fine = np.asarray(cv2.resize(crossing, size, interpolation=cv2.INTER_LINEAR), float)
         return fine[..., 0], fine[..., 1]
+
+
+@lru_cache(maxsize=2)
+def _rays_above(
+    lens: CameraCalibration, world_T_camera: RigidTransform, glass_thickness_m: float, glass_index: float
+) -> tuple[Array, Array]:
+    """Each pixel's ray above the table: its point at z = 0, and its direction per metre of height.
+
+    Both have shape (height, width, 3), world frame. They are the same for all sessions on one rig.
+    """
+    assert lens.size_px is not None
+    (width, height), pose = lens.size_px, world_T_camera.pose()
+    pixels = np.stack(np.meshgrid(np.arange(float(width)), np.arange(float(height))), axis=-1).reshape(-1, 2)
+    rays = rotate(pose, lens.rays(pixels))
+    slope = rays[:, :2] / rays[:, 2:]
+    tangent = np.linalg.norm(slope, axis=1)
+    glass_m = _glass_shift_m(tangent, glass_thickness_m, glass_index) / np.maximum(tangent, 1e-9)
+    centre_m = pose.translation()
+    ground_m = centre_m[:2] - slope * (centre_m[2] + glass_m[:, None])
+    up = np.ones((len(rays), 1))
+    return np.hstack([ground_m, 0 * up]).reshape(height, width, 3), np.hstack([slope, up]).reshape(height, width, 3)
+
+
+def _glass_shift_m(tangent: Array, thickness_m: float, index: float) -> Array:
+    """Sideways shift of a ray by the glass, from the tangent of its angle to the vertical."""
+    sine = tangent / np.sqrt(1 + tangent**2) / index
+    return np.asarray(thickness_m * (tangent - sine / np.sqrt(1 - sine**2)))
 
 
 def _half_modules(marker: PrintedMarker) -> tuple[_Picture, int]:

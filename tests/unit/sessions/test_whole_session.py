@@ -26,7 +26,7 @@ from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import rig_of_session
 from tactile_lab.workflow.running import SessionRequest, run_session
 from tests.support.baseline import assert_baseline
-from tests.support.digests import digest
+from tests.support.digest import digest_records
 from tests.support.low_rig import low_rig
 
 CLOSE = {"rtol": 1e-5, "atol": 1e-7}
@@ -90,7 +90,7 @@ def test_grasps_and_what_was_learned_of_the_object(recorded: Recorded) -> None:
             "grasps": [told(grasp) for grasp in outcome.grasps],
             "hangings": [[index, vars(each)] for index, each in properties.hangings],
             "draggings": [[index, vars(each)] for index, each in properties.draggings],
-            "sliding": digest(each for _, each in properties.sliding),
+            "sliding": digest_records(each for _, each in properties.sliding),
             "words": properties.in_words(),
         },
         **CLOSE,
@@ -119,7 +119,9 @@ def test_every_topic_of_the_recording(recorded: Recorded) -> None:
         elif message.topic != schemas.IMAGE_TOPIC:
             told = {"stamp_ns": message.stamp_ns, "content": without_time_of_day(json.loads(message.data))}
         content.setdefault(message.topic, []).append(told)
-    assert_baseline("sessions/whole/topics", {topic: digest(content[topic]) for topic in sorted(content)}, **CLOSE)
+    assert_baseline(
+        "sessions/whole/topics", {topic: digest_records(content[topic]) for topic in sorted(content)}, **CLOSE
+    )
 
 
 def without_time_of_day(content: dict[str, Any]) -> dict[str, Any]:
@@ -152,7 +154,12 @@ def test_it_is_understood_again_and_as_tables(recorded: Recorded) -> None:
     ].__repr__()
     tables = read_tables(session.traffic(), build_interpreter(rig))
     content = {
-        name: [table.columns, len(table.rows), table.stamps_ns[:: len(table.rows) // 3 + 1], digest(table.rows[::50])]
+        name: [
+            table.columns,
+            len(table.rows),
+            table.stamps_ns[:: len(table.rows) // 3 + 1],
+            digest_records(table.rows[::50]),
+        ]
         for name, table in tables.tables.items()
     }
     kinds = [type(outcome).__name__ for outcome in outcomes]

@@ -83,4 +83,4 @@ def test_known_poses() -> None:
         "strict": judge_joints(corrections, JointLimits(left_deg=0.1, sigma_deg=0.1, poses=4)),
         "record": [record.verdict, record.residuals, record.details, record.limits, record.devices, record.parameters],
     }
-    assert_baseline("calibration/known_poses", plain(found))
+    assert_baseline("calibration/known_poses", found)

@@ -18,7 +18,8 @@ from drivers.biotac.settings import BioTacSettings
 from drivers.biotac.slot_codec import Channel, Slot, decode_slot, electrode_channel, encode_slot
 from drivers.core.errors import DeviceError
 from tests.support.baseline import assert_baseline
-from tests.support.plain_values import condensed, plain
+from tests.support.digest import digest
+from tests.support.plain_values import plain
 from tests.support.repository import SIMULATED_HAND
 
 MS = 1_000_000
@@ -50,7 +51,7 @@ def test_electrodes_skins_and_contacts(electrodes: int) -> None:
         "models": [electrodes_of(serial) for serial in ("BTSP12", "BTTB3", "BT7", "")],
         "temperature": core_temperature_degC(np.array([100.0, 2000.0, 2280.0, 4000.0])),
     }
-    assert_baseline(f"biotac/electrodes_{electrodes}", plain(found), rtol=1e-6, atol=1e-10)
+    assert_baseline(f"biotac/electrodes_{electrodes}", found, rtol=1e-6, atol=1e-10)
 
 
 def test_slots() -> None:
@@ -135,6 +136,6 @@ def test_learned_normals_and_the_comparison_of_methods() -> None:
         "turn": rotation_to_sensor(turned, 19, 15.0),
         "rows": [asdict(row) for row in rows],
         "fitted": plain(fitted_spread(np.linspace(0.01, 0.3, 30), np.linspace(0.0, 1.0, 30))),
-        "examples": condensed(learned.examples.normals),
+        "examples": digest(learned.examples.normals),
     }
-    assert_baseline("biotac/learned", plain(found), rtol=1e-4, atol=1e-7)
+    assert_baseline("biotac/learned", found, rtol=1e-4, atol=1e-7)

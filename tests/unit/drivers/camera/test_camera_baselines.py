@@ -31,7 +31,8 @@ from drivers.camera.world_marker import WorldMarker
 from drivers.core.fingertip import RigidTransform
 from drivers.core.poses import transform_points
 from tests.support.baseline import assert_baseline
-from tests.support.plain_values import condensed, plain
+from tests.support.digest import digest
+from tests.support.plain_values import plain
 
 LENS, SMALL = simulated_lens((640, 480)), simulated_lens((320, 240))
 BOARDS: dict[str, AnyBoard] = {
@@ -65,14 +66,14 @@ def test_boards_drawn_read_and_printed(name: str) -> None:
     told: dict[str, Any] = {
         "pose": plain(pose),
         "size": [board.size_m, board.point_count, board.pattern, board.scale],
-        "corners": [len(points), condensed(points)],
-        "sheet": [sheet.size_mm, [condensed(np.vstack(area.outlines)) for area in sheet.areas]],
+        "corners": [len(points), digest(points)],
+        "sheet": [sheet.size_mm, [digest(np.vstack(area.outlines)) for area in sheet.areas]],
         "words": plain([sheet.lines, sheet.words]),
-        "svg": condensed(list(svg_text(sheet).encode())),
+        "svg": digest(list(svg_text(sheet).encode())),
     }
-    assert_baseline(f"camera/board_{name}", plain(told))
+    assert_baseline(f"camera/board_{name}", told)
     seen = {"grey": grey(image), "pixels": pixels[::5], "blurs": board.blurs_px(image)[:4]}
-    assert_baseline(f"camera/board_{name}_seen", plain(seen), atol=1.1)
+    assert_baseline(f"camera/board_{name}_seen", seen, atol=1.1)
     corners = np.array([[x, y, 0.0] for x in (-0.1, 0.0, 0.12) for y in (-0.08, 0.09)])
     exact = board_pose(corners, SMALL.project(transform_points(pose, corners)), SMALL, corner_sigma_px=0.2)
     assert_baseline(f"camera/board_{name}_pose", {"exact": plain(exact)}, rtol=1e-3, atol=1e-9)
@@ -81,7 +82,7 @@ def test_boards_drawn_read_and_printed(name: str) -> None:
 def test_sheets_of_several_prints() -> None:
     sheet = sheet_of([SingleMarker(number=0), SingleMarker(number=7, side_m=0.04), GridBoard(columns=2, rows=2)], "A4")
     told = plain([sheet.size_mm, sheet.lines, sheet.words])
-    areas = [[condensed(outline) for outline in area.outlines] for area in sheet.areas]
+    areas = [[digest(outline) for outline in area.outlines] for area in sheet.areas]
     assert_baseline(
         "camera/sheet", {"sheet": told, "areas": areas, "rectangles": [line.area_mm for line in sheet.lines]}
     )
@@ -164,7 +165,7 @@ def test_poses_from_exact_corners() -> None:
         "lens": [LENS.rays(pixels), LENS.project(camera), *LENS.projection(camera), LENS.matrix],
         "glass": [glass.shift(camera[:, :2] / 0.4), glass.apparent(camera, np.array([0.0, 0.1, -0.5]))],
     }
-    assert_baseline("camera/poses", plain(found), rtol=1e-4, atol=1e-7)
+    assert_baseline("camera/poses", found, rtol=1e-4, atol=1e-7)
 
 
 def test_the_bytes_of_a_packet() -> None:

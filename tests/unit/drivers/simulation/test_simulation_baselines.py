@@ -19,7 +19,8 @@ from drivers.simulation.model import build_model
 from drivers.simulation.objects import CATALOGUE, object_model
 from drivers.simulation.settings import BiotacSettings, HandBoard, JointSensorSettings, ObjectStart, SimulationSettings
 from tests.support.baseline import assert_baseline
-from tests.support.plain_values import condensed, plain
+from tests.support.digest import digest
+from tests.support.plain_values import plain
 from tests.support.simulated_program import Program, records
 
 OF_MODEL = (
@@ -48,7 +49,7 @@ def test_the_bodies_of_hand_positioner_table_and_object(side: str) -> None:
     tips: dict[str, TipBody] = {finger: calibration.tip_body(finger, "nano17") for finger in form.fingers}
     mount = Pose3.Expmap(np.array([0.1, 0.2, -0.3, 0.1, 0.0, 0.2]))
     model = build_model(object_model("sphere" if side == "left" else "hexagonal-prism"), 0.4, tips, mount, form)
-    found: dict[str, Any] = {name: condensed(getattr(model, name)) for name in OF_MODEL}
+    found: dict[str, Any] = {name: digest(getattr(model, name)) for name in OF_MODEL}
     option = model.opt
     found["options"] = [option.timestep, option.integrator, option.solver, option.cone, option.impratio]
     assert_baseline(f"simulation/model_{side}", found, rtol=1e-6, atol=1e-9)
@@ -65,11 +66,11 @@ def test_the_objects_of_the_catalogue() -> None:
     for name in CATALOGUE:
         target = object_model(name)
         solids = [
-            plain(piece) if hasattr(piece, "kind") else condensed(piece.vertices_object_m) for piece in target.pieces
+            plain(piece) if hasattr(piece, "kind") else digest(piece.vertices_object_m) for piece in target.pieces
         ]
         figures = [target.mesh.volume, target.mesh.area, target.height_m, target.rest_height_m]
-        foot = condensed(target.foot_object_m)
-        found[name] = [figures, condensed(target.mesh.bounds), foot, plain(target.marker), target.rolls, solids]
+        foot = digest(target.foot_object_m)
+        found[name] = [figures, digest(target.mesh.bounds), foot, plain(target.marker), target.rolls, solids]
     assert_baseline("simulation/objects", found)
 
 
@@ -86,7 +87,7 @@ def palm_story(program: Program) -> list[Any]:
         program.wait()
         status = decode_status(program.ask(**asked, which_motors=step % 2, tactile_data_type=step).payload)
         told.append([kind.name, *(np.asarray(part, float) for part in (status.torque, status.misc))])
-        told[-1] += [condensed(status.sensors), condensed(status.tactile), status.arrived, status.had_errors]
+        told[-1] += [digest(status.sensors), digest(status.tactile), status.arrived, status.had_errors]
         told[-1] += [status.tactile_valid, status.tactile_data_type, float(status.idle_time_us)]
     return told
 

@@ -21,7 +21,7 @@ from sessions.exchange.table_files import picture_suffix, rows_of, write_csv, wr
 from sessions.recording.running_session import create_session
 from sessions.recording.session import Session
 from tests.support.baseline import assert_baseline
-from tests.support.digests import said
+from tests.support.said import said
 
 
 @pytest.fixture

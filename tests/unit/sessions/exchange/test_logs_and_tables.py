@@ -13,8 +13,8 @@ import pytest
 from sessions.exchange.contact_log import ContactLog, read_contact_log, write_contact_log
 from sessions.exchange.timed_contacts import ImportSettings, read_timed_contacts
 from tests.support.baseline import assert_baseline
-from tests.support.digests import said
 from tests.support.made_results import grasps, true_poses
+from tests.support.said import said
 
 # --- contact logs
 

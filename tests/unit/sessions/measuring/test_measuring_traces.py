@@ -18,9 +18,9 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.measuring.calibration_measurer import CalibrationMeasurer
 from sessions.measuring.fingertip_measurer import FingertipMeasurer, FingertipMeasurerSettings
 from tests.support.baseline import assert_baseline
-from tests.support.digests import said
 from tests.support.disc_world import Disc, DiscTip, TIP_CENTRE_m
 from tests.support.motion_trace import TracedWorld
+from tests.support.said import said
 
 TIP = HandShape((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))
 HEIGHT_m = 0.06

@@ -16,9 +16,9 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.box_prober import BoxProber, ProbingSettings
 from sessions.motion.probing.touching import Toucher
 from tests.support.baseline import assert_baseline
-from tests.support.digests import as_name
 from tests.support.disc_world import Disc
 from tests.support.motion_trace import TIP, TracedWorld, grasp_cycle
+from tests.support.said import as_name
 
 AT = GraspFrame(0.004, -0.003, 0.3)
 BRISK = CycleSettings(finger_rad_s=6.0, travel_m_s=0.6, turn_rad_s=4.0)

@@ -21,7 +21,7 @@ from sessions.recording.running_session import create_session
 from sessions.recording.session import Session, new_folder
 from sessions.recording.traffic.reader import TrafficMessage
 from tests.support.baseline import assert_baseline
-from tests.support.digests import said
+from tests.support.said import said
 
 STARTED = datetime(2026, 11, 21, 9, 30, tzinfo=UTC)
 

@@ -15,7 +15,8 @@ from sessions.recording.recorder import Recorder
 from sessions.rig_runtime.cycle_timing import CycleTiming
 from sessions.rig_runtime.flight_recorder import CycleSnapshot, FlightRecorder
 from tests.support.baseline import assert_baseline
-from tests.support.digests import digest, said
+from tests.support.digest import digest_records
+from tests.support.said import said
 from tests.support.session_fakes import make_rig, play_session
 from tests.support.told_session import Kept
 
@@ -98,7 +99,7 @@ def test_a_runtime_and_all_that_it_records() -> None:
         topics.setdefault(topic, []).append(
             {"stamp_ns": stamp_ns, "size": len(data) if topic.startswith("/link") else 0}
         )
-    told["topics"] = {topic: digest(found) for topic, found in sorted(topics.items())}
+    told["topics"] = {topic: digest_records(found) for topic, found in sorted(topics.items())}
     rig.runtime.camera = None
     told["no camera"] = [said(runtime.picture), said(runtime.truth_frame)]
     assert_baseline("sessions/runtime/recorded", told, rtol=1e-6)

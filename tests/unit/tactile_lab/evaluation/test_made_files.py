@@ -18,12 +18,13 @@ from tactile_lab.evaluation.files.trajectory_file import read_trajectory
 from tactile_lab.evaluation.files.tum_file import tum_text
 from tactile_lab.evaluation.shape import horizontal_outline
 from tests.support.baseline import assert_baseline
-from tests.support.digests import digest, said
+from tests.support.digest import digest_records
 from tests.support.made_results import (
     COUNT,
     poses,
     written,
 )
+from tests.support.said import said
 
 CLOSE = {"rtol": 1e-5, "atol": 1e-7}
 
@@ -34,18 +35,18 @@ def test_the_files_of_results(dimension: int, tmp_path: Path) -> None:
     told: dict[str, Any] = {"names": sorted(path.name for path in tmp_path.iterdir())}
     for path in sorted(tmp_path.glob("*.csv")):
         head, *rows = csv.reader(path.read_text().splitlines())
-        told[path.name] = [head, len(rows), digest([_number(entry) for entry in row] for row in rows)]
-    told["slam.json"] = digest([json.loads((tmp_path / "slam.json").read_text())])
+        told[path.name] = [head, len(rows), digest_records([_number(entry) for entry in row] for row in rows)]
+    told["slam.json"] = digest_records([json.loads((tmp_path / "slam.json").read_text())])
     for name in sorted({"mesh.ply", "known.ply"} & set(told["names"])):
         whole = trimesh.load(tmp_path / name, process=False)
         data = whole.metadata["_ply_raw"]["vertex"]["data"]
         values = {column: data[column].astype(float) for column in data.dtype.names}
-        told[name] = [len(whole.faces), digest(whole.faces[::5].tolist()), digest([values])]
+        told[name] = [len(whole.faces), digest_records(whole.faces[::5].tolist()), digest_records([values])]
         told[f"{name} begins"] = (tmp_path / name).read_bytes().partition(b"end_header")[0].decode()
     told["mesh.glb"] = len((tmp_path / "mesh.glb").read_bytes())
     estimated = read_estimated_mesh(tmp_path / "mesh.ply")
     told["read"] = [estimated.sigma_m.sum(), int(estimated.known.sum()), estimated.mesh.volume]
-    told["contacts"] = [digest([vars(rows)]) for rows in read_results(tmp_path).contacts]
+    told["contacts"] = [digest_records([vars(rows)]) for rows in read_results(tmp_path).contacts]
     assert_baseline(f"evaluation/files_{dimension}", told, **CLOSE)
 
 

@@ -26,7 +26,6 @@ from tactile_lab.evaluation.standard_error import standard_errors
 from tactile_lab.evaluation.table import evaluation_rows
 from tactile_lab.evaluation.trajectory import pose_errors
 from tests.support.baseline import assert_baseline
-from tests.support.digests import as_name, said
 from tests.support.made_results import (
     COUNT,
     contour,
@@ -38,6 +37,7 @@ from tests.support.made_results import (
     written,
     yaw_pose,
 )
+from tests.support.said import as_name, said
 
 KINDS = ("2, box", "3, box", "2, outline", "2, lost")
 CLOSE = {"rtol": 1e-5, "atol": 1e-7}

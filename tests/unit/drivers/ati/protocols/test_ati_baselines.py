@@ -52,7 +52,7 @@ def test_each_status_bit_in_words() -> None:
         can_codec.describe_status(0),
         digital_wire.describe_status(0),
     ]
-    assert_baseline("ati/bits", plain(found))
+    assert_baseline("ati/bits", found)
 
 
 def test_messages_in_bytes() -> None:
@@ -145,4 +145,4 @@ def test_units_and_tools() -> None:
         "matrix": [calibration.working_matrix, calibration.ranges_SI],
         "sensor": [plain(block), block.working_matrix, block.ranges_SI],
     }
-    assert_baseline("ati/units", plain(found))
+    assert_baseline("ati/units", found)

@@ -31,7 +31,8 @@ from drivers.emulators.ati.net_box_unit import NetBoxUnit
 from drivers.emulators.ati.sensor import RANGES, EmulatedSensor, emulated_calibration
 from drivers.emulators.ati.unit import Unit
 from tests.support.baseline import assert_baseline
-from tests.support.plain_values import condensed, plain
+from tests.support.digest import digest
+from tests.support.plain_values import plain
 from tests.support.repository import SIMULATED_HAND
 from tests.support.unit_peer import UnitPeer
 
@@ -193,7 +194,7 @@ def test_pages_rates_stamps_and_patience() -> None:
     ]
     found = {"page": plain(parse_page(page)), "rates": rates, "stamps": stamps, "patience": told}
     found["volts"] = plain(decode_volts(encode_volts(7, (0.1, -0.2, 0.3, -0.4, 0.5, 9.9))))
-    found["state"] = condensed(list(page))
+    found["state"] = digest(list(page))
     for damaged in (
         page.replace(b"1000000", b"0"),
         page.replace(b"FT00001", b""),

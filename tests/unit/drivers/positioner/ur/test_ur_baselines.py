@@ -234,7 +234,7 @@ def test_what_each_state_of_an_arm_means() -> None:
         "taken": [before_program(replace(READY, runtime_state=state), SETTINGS) for state in (1, 2)],
         "versions": {v: wrong_version(v) for v in ("3.10.1", "3.11", "4.99.0", "5.5.9", "5.6.0", "6.0", "10.7")},
     }
-    assert_baseline("ur/states", plain(found))
+    assert_baseline("ur/states", found)
 
 
 def test_a_way_with_its_speeds() -> None:

@@ -60,7 +60,7 @@ def test_bodies_of_the_links_and_of_the_open_hand(side: str) -> None:
         "collides": [links.collides(near + off, free) for off in (-0.01, 0.0, 0.01, 0.03)],
         "open": [envelope.centres_m, envelope.radii_m, envelope.lowest_m],
     }
-    assert_baseline(f"closing/bodies_{side}", plain(found), rtol=1e-4, atol=1e-4)
+    assert_baseline(f"closing/bodies_{side}", found, rtol=1e-4, atol=1e-4)
 
 
 def test_how_motors_turn_for_small_moves_of_the_fingertips() -> None:
@@ -71,4 +71,4 @@ def test_how_motors_turn_for_small_moves_of_the_fingertips() -> None:
         for name, way in {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}.items()
     }
     moved = {form.side: [moved_joints(f, form) for f in form.fingers] for form in (HandForm("right"), NARROW)}
-    assert_baseline("closing/rates", plain({"rates": ways, "moved": moved}), rtol=1e-3, atol=1e-2)
+    assert_baseline("closing/rates", {"rates": ways, "moved": moved}, rtol=1e-3, atol=1e-2)

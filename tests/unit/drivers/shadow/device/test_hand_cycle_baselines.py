@@ -77,7 +77,7 @@ def test_targets_are_followed_within_their_gains_and_limits() -> None:
     bench.do("close", hand.close)
     found = {f"{number} {what}": rest for number, (what, *rest) in enumerate(bench.told)}
     drivable = [list(hand.drivable), len(bench.palm.commands)]
-    assert_baseline("hand/targets", plain({"connecting": asked, "drivable": drivable, **found}), rtol=1e-6, atol=1.01)
+    assert_baseline("hand/targets", {"connecting": asked, "drivable": drivable, **found}, rtol=1e-6, atol=1.01)
 
 
 def _damaged(bench: Bench) -> None:
@@ -117,7 +117,7 @@ def test_how_a_moving_hand_meets_each_fault(fault: str) -> None:
     bench.do("resume", bench.hand.resume)
     bench.run("resumed", 6)
     found = {f"{number} {what}": rest for number, (what, *rest) in enumerate(bench.told)}
-    assert_baseline(f"hand/{fault.replace(' ', '_')}", plain(found), rtol=1e-6, atol=1.01)
+    assert_baseline(f"hand/{fault.replace(' ', '_')}", found, rtol=1e-6, atol=1.01)
 
 
 def test_a_palm_that_does_not_answer_is_not_connected() -> None:
@@ -128,7 +128,7 @@ def test_a_palm_that_does_not_answer_is_not_connected() -> None:
     bench.do("unwritten", bench.hand.connect)
     bench.palm.unwritten, bench.palm.garbage = False, bytes(7)
     bench.do("other", bench.hand.connect)
-    assert_baseline("hand/connecting", plain({str(n): told for n, told in enumerate(bench.told)}))
+    assert_baseline("hand/connecting", {str(n): told for n, told in enumerate(bench.told)})
 
 
 def test_paces_and_statistics_of_cycles() -> None:
@@ -141,4 +141,4 @@ def test_paces_and_statistics_of_cycles() -> None:
         told.append([*waited, rig.clock.now_ns()])
     summary = statistics.summary()
     empty = CycleStatistics().summary()
-    assert_baseline("hand/pace", plain({"told": told, "summary": summary, "empty": empty}))
+    assert_baseline("hand/pace", {"told": told, "summary": summary, "empty": empty})

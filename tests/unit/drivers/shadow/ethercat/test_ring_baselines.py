@@ -11,8 +11,9 @@ from drivers.ethercat.frames import decode_frame
 from drivers.shadow.protocol.palm_images import PalmName
 from drivers.shadow.protocol.palm_messages import PalmCommand
 from tests.support.baseline import assert_baseline
+from tests.support.digest import digest
 from tests.support.emulated_hand_wire import Wire
-from tests.support.plain_values import condensed, plain
+from tests.support.plain_values import plain
 
 
 class Overheard:
@@ -63,7 +64,7 @@ def test_a_hand_is_opened_served_and_closed(palm: PalmName, eeprom: EepromKind, 
         "health": list(transport.health()),
         "states": [int(state) for state in wire.states],
         "slaves": [plain(slave.counts) for slave in wire.hand.ring.slaves],
-        "sent": condensed(list(overheard.sent)),
+        "sent": digest(list(overheard.sent)),
     }
     overheard.told.clear()
     transport.close()

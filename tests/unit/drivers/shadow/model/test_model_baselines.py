@@ -87,4 +87,4 @@ def test_motors_gains_and_forms_of_hands() -> None:
         "lite": [str(lite), lite.fingers, lite.long_fingers, lite.joints, lite.is_left, lite.handedness],
         "mirrored": str(lite.mirrored),
     }
-    assert_baseline("shadow/motors", plain(found))
+    assert_baseline("shadow/motors", found)

@@ -95,7 +95,7 @@ def test_which_motors_were_heard() -> None:
             heard = PalmStatus(**{**vars(status(16)), "which_motors": parity, "arrived": arrived, "had_errors": wrong})
             places = [part.indices(20) if isinstance(part, slice) else part.tolist() for part in heard.heard_places]
             found[f"{parity} {arrived:x}"] = [heard.heard_motors, places, heard.written]
-    assert_baseline("palm/heard", plain(found))
+    assert_baseline("palm/heard", found)
 
 
 def test_words_of_the_motors() -> None:
@@ -114,7 +114,7 @@ def test_words_of_the_motors() -> None:
         "zero": config_crc((0,) * 10),
         "kinds": [{kind.name: int(kind) for kind in kinds} for kinds in (FromMotor, ToMotor, SlowData)],
     }
-    assert_baseline("palm/motors", plain(found))
+    assert_baseline("palm/motors", found)
 
 
 def test_identifiers_on_the_motors_buses() -> None:
@@ -122,7 +122,7 @@ def test_identifiers_on_the_motors_buses() -> None:
     words = {hex(each.identifier): str(each) for each in every}
     found = {"words": words, "buses": [bus_of(motor) for motor in range(20)]}
     found["motors"] = [MotorIdentifier.of(0x200 | motor << 5).motor(bus) for bus in (1, 2) for motor in (0, 9)]
-    assert_baseline("palm/identifiers", plain(found))
+    assert_baseline("palm/identifiers", found)
 
 
 def test_what_fingertips_are_asked() -> None:

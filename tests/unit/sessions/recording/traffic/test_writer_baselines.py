@@ -21,7 +21,7 @@ from sessions.recording.traffic.settings import Attached, TrafficSettings
 from sessions.recording.traffic.tail import Tail, TailMessage, read_tail
 from sessions.recording.traffic.writer import TrafficWriter
 from tests.support.baseline import assert_baseline
-from tests.support.digests import said
+from tests.support.said import said
 
 
 @pytest.fixture(autouse=True)

@@ -13,8 +13,9 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.fixed_lag import condense, unfold
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost, estimated_noise, pushed_nats
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
-from tests.support.baseline import assert_baseline, digest
+from tests.support.baseline import assert_baseline
 from tests.support.baseline_problems import KINDS, Kind, session, true_placed, varied_map
+from tests.support.digest import digest
 
 NOISE = MotionNoise(translation_m=0.004, rotation_rad=0.1, unheld=0.15)
 LOOSE = MotionNoise(translation_m=0.003, rotation_rad=0.07, unheld=0.8, gripped=False)

@@ -22,8 +22,9 @@ from tactile_lab.slam.tracking.faces.solid_face_extents import solid_face_extent
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 from tactile_lab.slam.tracking.joint.proposals import ProposalSettings
-from tests.support.baseline import assert_baseline, digest
+from tests.support.baseline import assert_baseline
 from tests.support.baseline_problems import KINDS, Kind, session, told, true_placed
+from tests.support.digest import digest
 
 NOISE = MotionNoise(translation_m=0.006, rotation_rad=0.2, palm_m=0.001)
 

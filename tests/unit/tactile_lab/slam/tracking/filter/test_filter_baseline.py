@@ -20,8 +20,9 @@ from tactile_lab.slam.tracking.filter.measurement import (
 )
 from tactile_lab.slam.tracking.filter.particle_filter import Belief
 from tactile_lab.slam.tracking.trackers import TrackingSettings, make_tracker
-from tests.support.baseline import assert_baseline, digest
+from tests.support.baseline import assert_baseline
 from tests.support.baseline_problems import Kind, any_rows, felt, kernel, session, true_placed
+from tests.support.digest import digest
 
 MEASUREMENTS: dict[str, Measurement] = {
     "calibrated": CalibratedMeasurement(CalibratedSettings()),

@@ -29,7 +29,7 @@ from tactile_lab.slam.tracking.joint.proposals import GraspMatch, ProposalSettin
 from tactile_lab.slam.tracking.joint.second_opinions import SecondOpinions
 from tactile_lab.slam.tracking.joint.settings import JointSettings
 from tactile_lab.slam.tracking.joint.trajectory_splicing import splice_trajectories
-from tests.support.baseline import assert_baseline, digest
+from tests.support.baseline import assert_baseline
 from tests.support.baseline_problems import (
     KINDS,
     Kind,
@@ -42,6 +42,7 @@ from tests.support.baseline_problems import (
     unheld,
     varied_map,
 )
+from tests.support.digest import digest
 
 NOISE = MotionNoise(translation_m=0.006, rotation_rad=0.2, unheld=0.15, palm_m=0.0007)
 SETTINGS = ProposalSettings(samples=24)

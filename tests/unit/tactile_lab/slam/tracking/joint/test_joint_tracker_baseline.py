@@ -11,8 +11,9 @@ from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.slam.graph.relocation import relocated_poses
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.trackers import TrackingSettings, make_tracker
-from tests.support.baseline import assert_baseline, digest
+from tests.support.baseline import assert_baseline
 from tests.support.baseline_problems import Kind, felt, session, thrown, told, true_placed, unheld
+from tests.support.digest import digest
 
 MOTION = {"translation_m": 0.006, "rotation_rad": 0.15, "unheld": 0.15, "palm_m": 0.0005}
 CLOSE = {"rtol": 1e-3, "atol": 1e-5}
