@@ -17,6 +17,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import SessionDataError, given_by_a_person
 from drivers.simulation.mesh_object import convex_pieces
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
+from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.files.tables import RERUN
 
 ASSUMED_DENSITY_kg_m3 = 600.0
@@ -61,9 +62,10 @@ class SolidModel:
         sigma_m: standard deviation of the surface at each of its vertices, shape (n,).
         parts: convex hulls whose union approximates the surface, for collisions.
         mass_kg: total.
-        mass_is_assumed: whether nobody stated it.
+        mass_is_assumed: whether nobody stated or measured it.
         friction: Coulomb's, against anything.
         lowered_m: height of the object frame's origin over the model's.
+        measured_centre_m: x and y of the centre of mass, shape (2,); None if the object was not weighed.
     """
 
     name: str
@@ -74,15 +76,17 @@ class SolidModel:
     mass_is_assumed: bool
     friction: float
     lowered_m: float
+    measured_centre_m: Array | None = None
 
     @property
     def centre_m(self) -> Array:
-        """Centre of mass of the evenly filled surface, shape (3,)."""
-        return np.asarray(self.surface.center_mass, dtype=float)
+        """Centre of mass, shape (3,): as measured in x and y, otherwise of the evenly filled surface."""
+        even_m = np.asarray(self.surface.center_mass, dtype=float)
+        return even_m if self.measured_centre_m is None else np.append(self.measured_centre_m, even_m[2])
 
     @property
     def inertia_kg_m2(self) -> Array:
-        """Inertia about the centre of mass along the model's axes, shape (3, 3)."""
+        """Inertia of the evenly filled surface about its centre, along the model's axes, shape (3, 3)."""
         return np.asarray(self.surface.moment_inertia, dtype=float) * (self.mass_kg / self.surface.volume)
 
     @property
@@ -111,15 +115,20 @@ class SolidModel:
 
 
 def make_model(
-    mesh_file: Path, name: str, mass_kg: float | None = None, friction: float = ASSUMED_FRICTION
+    mesh_file: Path,
+    name: str,
+    mass_kg: float | None = None,
+    friction: float | None = None,
+    measured: MeasuredBody | None = None,
 ) -> SolidModel:
     """The model of an estimated surface.
 
     Args:
         mesh_file: ``mesh.ply`` of a session's results, with ``sigma_m`` at each vertex.
         name: of the model.
-        mass_kg: of the object; None assumes :data:`ASSUMED_DENSITY_kg_m3`.
-        friction: Coulomb's.
+        mass_kg: of the object; None takes what was measured, or else assumes :data:`ASSUMED_DENSITY_kg_m3`.
+        friction: Coulomb's; None takes the table's as it was measured, or else assumes :data:`ASSUMED_FRICTION`.
+        measured: what the session measured of the object.
 
     Raises:
         SessionDataError: there is no such file.
@@ -128,15 +137,19 @@ def make_model(
     surface, sigma_m = _read_surface(mesh_file)
     lowered_m = -float(surface.vertices[:, 2].min())
     surface.apply_translation([0.0, 0.0, lowered_m])
+    known = measured or MeasuredBody()
+    stated_kg = known.mass_kg.value if mass_kg is None and known.mass_kg is not None else mass_kg
+    usual = ASSUMED_FRICTION if known.table_friction is None else known.table_friction.value
     return SolidModel(
         name=name,
         surface=surface,
         sigma_m=sigma_m,
         parts=tuple(_standing_hull(corners) for corners in convex_pieces(surface)),
-        mass_kg=ASSUMED_DENSITY_kg_m3 * float(surface.volume) if mass_kg is None else mass_kg,
-        mass_is_assumed=mass_kg is None,
-        friction=friction,
+        mass_kg=ASSUMED_DENSITY_kg_m3 * float(surface.volume) if stated_kg is None else stated_kg,
+        mass_is_assumed=stated_kg is None,
+        friction=usual if friction is None else friction,
         lowered_m=lowered_m,
+        measured_centre_m=known.centre_m,
     )
 
 

@@ -16,7 +16,7 @@ from sessions.recording.session import Session
 from tactile_lab.evaluation.estimate_with_truth import Truth, true_outline
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.plain import read_json_object
-from tactile_lab.evaluation.files.properties_file import read_mass
+from tactile_lab.evaluation.files.properties_file import read_measured
 from tactile_lab.evaluation.files.results import Results, read_results
 from tactile_lab.evaluation.files.tables import read_contour
 from tactile_lab.evaluation.files.trajectory_file import read_trajectory
@@ -57,7 +57,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
         contour_sigma_m=sigma_m,
         truth=truth,
         fitted_outline_m=_fit(contour_m, truth),
-        mass_kg=read_mass(folder),
+        mass_kg=read_measured(folder).mass_kg,
         course=read_course(session),
         camera=camera,
         camera_problem=problem,

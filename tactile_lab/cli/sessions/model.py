@@ -37,7 +37,12 @@ def export(
         float | None,
         typer.Option(min=1e-4, max=100.0, help="The object's mass.", show_default="as weighed, or 600 kg/m³"),
     ] = None,
-    friction: Annotated[float, typer.Option(min=0.0, max=10.0, help="Coefficient of friction.")] = 0.5,
+    friction: Annotated[
+        float | None,
+        typer.Option(
+            min=0.0, max=10.0, help="Coefficient of friction.", show_default="the table's as measured, or 0.5"
+        ),
+    ] = None,
     name: Annotated[str, typer.Option(help="Name of the model.", show_default="the object's")] = "",
     root: Root = Path("runs"),
     as_json: Json = False,
@@ -52,7 +57,7 @@ def export(
     from sessions.recording.session import RESULTS
     from sessions.recording.session_ids import slug
     from tactile_lab.cli.console import answer, emit_json, warn
-    from tactile_lab.evaluation.files.properties_file import read_mass
+    from tactile_lab.evaluation.files.properties_file import read_measured
     from tactile_lab.models.model_files import formats_installed, write_model
     from tactile_lab.models.solid_model import make_model
 
@@ -62,8 +67,7 @@ def export(
     found = choose_session(root, session)
     named = slug(name or found.manifest.object_name)
     results = found.folder / RESULTS
-    weighed = read_mass(results) if mass_kg is None else None
-    model = make_model(results / "mesh.ply", named, mass_kg if weighed is None else weighed.value, friction)
+    model = make_model(results / "mesh.ply", named, mass_kg, friction, read_measured(results))
     files = write_model(out, model, wanted or formats_installed())
     if as_json:
         emit_json({"session": str(found.folder), "files": [str(file) for file in files], **model.as_json()})

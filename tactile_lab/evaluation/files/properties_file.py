@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.atomic_files import write_whole
+from drivers.core.contacts import Array
 from drivers.core.errors import SessionError
 from drivers.core.poses import planar
 from sessions.perception.weighing.object_properties import ObjectProperties, Value
@@ -45,17 +47,42 @@ def write_properties(folder: Path, properties: ObjectProperties, world_T_object:
     write_whole(folder / PROPERTIES, json_text(record))
 
 
-def read_mass(results: Path) -> Value | None:
-    """The mass in a results folder; None if the object was not weighed. Raises SessionError for a damaged file."""
+@dataclass(frozen=True)
+class MeasuredBody:
+    """What a session measured of an object; None where it did not.
+
+    Attributes:
+        mass_kg: mass.
+        centre_m: of mass, x and y in the object frame, shape (2,).
+        table_friction: coefficient of friction of the table.
+    """
+
+    mass_kg: Value | None = None
+    centre_m: Array | None = None
+    table_friction: Value | None = None
+
+
+def read_measured(results: Path) -> MeasuredBody:
+    """What a results folder says of the object. Raises SessionError for a damaged file."""
     file = results / PROPERTIES
     if not file.is_file():
-        return None
+        return MeasuredBody()
     hint = "Replay the session into a new folder: tactile-lab session replay"
-    mass = read_json_object(file, hint=hint).get("mass_kg")
+    record = read_json_object(file, hint=hint)
+    centre = record.get("centre_of_mass_m")
     try:
-        return None if mass is None else Value(float(mass["value"]), float(mass["sigma"]))
+        return MeasuredBody(
+            _value(record.get("mass_kg")),
+            None if centre is None else np.array(centre["value"], dtype=float).reshape(2),
+            _value(record.get("table_friction")),
+        )
     except (KeyError, TypeError, ValueError) as error:
-        raise SessionError("mass_kg needs a finite value and sigma", where=str(file), hint=hint) from error
+        text = "mass_kg, centre_of_mass_m and table_friction need finite values"
+        raise SessionError(text, where=str(file), hint=hint) from error
+
+
+def _value(given: dict[str, Any] | None) -> Value | None:
+    return None if given is None else Value(float(given["value"]), float(given["sigma"]))
 
 
 def _centre(properties: ObjectProperties, world_T_object: Sequence[Pose3 | None]) -> dict[str, Any] | None:

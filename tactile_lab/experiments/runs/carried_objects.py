@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from gtsam import Pose2, Pose3
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, Grasp, StepSigma
 from drivers.core.poses import planar
+from drivers.simulation.object_names import MESH_PREFIX
 from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import GraspReport, NullProgress
@@ -26,6 +27,7 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.experiments.cells import Cell
+from tactile_lab.experiments.data.solids import YCB_PREFIX, ycb_path
 from tactile_lab.experiments.data.spoilt_samples import AS_MEASURED, SPOILT, spoil
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
@@ -45,12 +47,14 @@ class WatchedCarry:
         by: how the object moved, by the samples of each kind of hand; of :data:`PALM`, how the palm moved.
         before, after, later: the object's true poses at the capture, when the hand opened, and at the next capture; the
             last is None for the last grasp.
+        stated: standard deviations of the motion, as the next grasp states them.
     """
 
     by: Mapping[str, Carry]
     before: Pose2
     after: Pose2
     later: Pose2 | None
+    stated: StepSigma | None
 
 
 class CarryWatch(NullProgress):
@@ -103,16 +107,18 @@ class CarryWatch(NullProgress):
         self._grasped.append((report.stamp_ns, self._carried))
         self._carried = None
 
-    @property
-    def carries(self) -> list[WatchedCarry]:
-        """Every carry of the session that fingertips felt."""
+    def carries(self, grasps: Sequence[Grasp]) -> list[WatchedCarry]:
+        """Every carry of the session that fingertips felt; ``grasps`` are the session's."""
         later_ns = [stamp_ns for stamp_ns, _ in self._grasped[1:]]
+        stated = {grasp.stamp_ns: grasp.motion_sigma for grasp in grasps}
         found = []
         for at, (stamp_ns, carried) in enumerate(self._grasped):
             if carried is None or not carried[1]:
                 continue
-            later = self.true_pose(later_ns[at]) if at < len(later_ns) else None
-            found.append(WatchedCarry(carried[1], self.true_pose(stamp_ns), self.true_pose(carried[0]), later))
+            then_ns = later_ns[at] if at < len(later_ns) else None
+            later = None if then_ns is None else self.true_pose(then_ns)
+            sigma = None if then_ns is None else stated.get(then_ns)
+            found.append(WatchedCarry(carried[1], self.true_pose(stamp_ns), self.true_pose(carried[0]), later, sigma))
         return found
 
     def true_pose(self, stamp_ns: int) -> Pose2:
@@ -137,14 +143,18 @@ class CarryWatch(NullProgress):
 def watch_carries(
     object_name: str, seed: int, grasps: int, mass_kg: float = MASS_kg, weighings: int = 0
 ) -> tuple[SessionOutcome, CarryWatch]:
-    """A session of the fixed rule, in which the object is carried after every grasp but the last."""
-    rig = _rig_with(mass_kg)
-    world = simulated_world(rig, seed, object_name)
+    """A session of the fixed rule, in which the object is carried after every grasp but the last.
+
+    Raises ConfigurationError: the object is a scan, and the scans are not on this machine.
+    """
+    rig, is_scan = _rig_with(mass_kg), object_name.startswith(YCB_PREFIX)
+    on_rig = f"{MESH_PREFIX}{ycb_path(object_name.removeprefix(YCB_PREFIX))}" if is_scan else object_name
+    world = simulated_world(rig, seed, on_rig)
     runtime = build_runtime(rig, world, NullRecorder())
     watch = CarryWatch(world, runtime, seed)
     runtime.observer.interpreter.listener = watch.on_sample
     slam = TactileSlam(slam_settings("odometry", 2, rig.description.motion), seed)
-    settings = _by_rule(rig, grasps, weighings)
+    settings = _by_rule(rig, grasps, weighings, top=is_scan)
     runtime.connect()
     try:
         roles = autonomous_roles(runtime, slam, settings, seed=seed, dimension=2)
@@ -159,11 +169,12 @@ def _rig_with(mass_kg: float) -> Rig:
     return replace(rig, description=rig.description.model_copy(update={"simulation": simulation}))
 
 
-def _by_rule(rig: Rig, grasps: int, weighings: int) -> SessionSettings:
+def _by_rule(rig: Rig, grasps: int, weighings: int, top: bool) -> SessionSettings:
+    """Settings of the fixed rule; ``top``: feel first how tall the object is, as scans may be taller than the hand."""
     usual = rig.description.conductor
     exploration = usual.exploration.model_copy(update={"policy": None})
     changes = {"grasps": grasps, "fixed_grasps": grasps + 1, "weighings": weighings}
-    return usual.model_copy(update={**changes, "exploration": exploration, "probing": ProbingSettings(top=False)})
+    return usual.model_copy(update={**changes, "exploration": exploration, "probing": ProbingSettings(top=top)})
 
 
 # --- figures ---------------------------------------------------------------------------------------------------
@@ -174,7 +185,7 @@ def carry_object(cell: Cell) -> dict[str, Any]:
     outcome, watch = watch_carries(
         str(cell["object"]), cell.seed, int(cell["grasps"]), float(cell["mass_kg"]), int(cell["weighed"])
     )
-    found = watch.carries
+    found = watch.carries(outcome.grasps)
     told = {"ending": str(outcome.ending), "grasps_done": len(outcome.grasps), "carries": len(found), **figures(found)}
     told["foretold"] = sum("will slip" in each for each in watch.told)
     return {**told, "worst_step_mm": max(told["as_measured_step_mm"], default=None)}
@@ -187,15 +198,15 @@ def figures(carries: Sequence[WatchedCarry]) -> dict[str, Any]:
     standard deviations.
     """
     steps = [each for each in carries if each.later is not None]
+    stated = [each for each in steps if each.stated is not None]
     found: dict[str, Any] = {}
     for how in (PALM, *SPOILT):
         name = how.replace(" ", "_")
         found |= _errors(f"{name}_carry", np.array([_error(each, how, each.after) for each in carries]).reshape(-1, 3))
         off = np.array([_error(each, how, each.later) for each in steps]).reshape(-1, 3)
         found |= _errors(f"{name}_step", off)
-        shares = off / np.array([_sigmas(each.by[how]) for each in steps]).reshape(-1, 3)
-        found |= {f"{name}_z_mm": shares[:, :2].ravel().tolist(), f"{name}_z_deg": shares[:, 2].tolist()}
-    return found
+    shares = np.array([_error(each, AS_MEASURED, each.later) / _sigmas(each.stated) for each in stated]).reshape(-1, 3)
+    return found | {"stated_z_mm": shares[:, :2].ravel().tolist(), "stated_z_deg": shares[:, 2].tolist()}
 
 
 def _error(carry: WatchedCarry, how: str, true: Pose2 | None) -> Array:
@@ -205,8 +216,9 @@ def _error(carry: WatchedCarry, how: str, true: Pose2 | None) -> Array:
     return np.array([said.x() - true.x(), said.y() - true.y(), true.between(said).theta()])
 
 
-def _sigmas(carry: Carry) -> list[float]:
-    return [carry.sigma.translation_m, carry.sigma.translation_m, carry.sigma.rotation_rad]
+def _sigmas(stated: StepSigma | None) -> Array:
+    assert stated is not None
+    return np.array([stated.translation_m, stated.translation_m, stated.rotation_rad])
 
 
 def _errors(name: str, off: Array) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from gtsam import Pose3, Rot3
 from drivers.core.errors import SessionError
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.weighing import Dragging, Hanging
-from tactile_lab.evaluation.files.properties_file import PROPERTIES, read_mass, write_properties
+from tactile_lab.evaluation.files.properties_file import PROPERTIES, read_measured, write_properties
 
 FREE = Hanging(2.94, 0.05, np.array([0.11, 0.02]), np.array([0.001, 0.001]), 0.0)
 STANDING = Hanging(2.0, 0.05, np.array([0.3, 0.3]), np.array([0.001, 0.001]), 0.5)
@@ -23,21 +23,24 @@ def test_mass_and_centre_are_written_in_the_object_frame(tmp_path):
     assert record["centre_of_mass_m"]["value"] == pytest.approx([0.02, -0.01])
     assert (record["times_weighed"], record["times_weighed_free"]) == (2, 1)
     assert record["table_friction"]["value"] == pytest.approx(1.0 / 2.94)
-    assert read_mass(tmp_path).value == pytest.approx(0.2998, abs=1e-4)
+    measured = read_measured(tmp_path)
+    assert measured.mass_kg.value == pytest.approx(0.2998, abs=1e-4)
+    assert measured.centre_m == pytest.approx([0.02, -0.01])
+    assert measured.table_friction.value == pytest.approx(1.0 / 2.94)
 
 
 def test_an_object_that_was_not_weighed_has_no_file_and_no_mass(tmp_path):
     write_properties(tmp_path, ObjectProperties(sliding=[(0, np.ones(50))]), POSES)
     assert not (tmp_path / PROPERTIES).exists()
-    assert read_mass(tmp_path) is None
+    assert read_measured(tmp_path).mass_kg is None
 
 
 def test_one_that_never_hung_free_has_a_file_without_a_mass(tmp_path):
     write_properties(tmp_path, ObjectProperties(hangings=[(1, STANDING)]), POSES)
-    assert read_mass(tmp_path) is None
+    assert read_measured(tmp_path).mass_kg is None
 
 
 def test_a_damaged_file_is_named(tmp_path):
     (tmp_path / PROPERTIES).write_text('{"mass_kg": {"value": "heavy"}}')
-    with pytest.raises(SessionError, match="mass_kg needs a finite value and sigma"):
-        read_mass(tmp_path)
+    with pytest.raises(SessionError, match="need finite values"):
+        read_measured(tmp_path)

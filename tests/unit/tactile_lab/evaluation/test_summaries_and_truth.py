@@ -21,7 +21,7 @@ from tactile_lab.evaluation.comparison import EvaluatedRun, compare, markdown, r
 from tactile_lab.evaluation.consistency.levels import CURVE, LEVELS
 from tactile_lab.evaluation.consistency.surfaces import surface_consistency
 from tactile_lab.evaluation.files.plain import json_text, plain, read_json_object
-from tactile_lab.evaluation.files.properties_file import PROPERTIES, read_mass, write_properties
+from tactile_lab.evaluation.files.properties_file import PROPERTIES, read_measured, write_properties
 from tactile_lab.evaluation.prism import open_ring, prism, signed_area_m2, triangulate
 from tactile_lab.evaluation.spread import Interval, Spread, number, quantile
 from tactile_lab.evaluation.sweep import SweepRow, SweepRun, markdown_table, planned_runs, summaries
@@ -212,11 +212,11 @@ def test_properties_in_the_object_frame(tmp_path: Path) -> None:
     }.items():
         write_properties(tmp_path, known, poses)
         told[name] = read_json_object(tmp_path / PROPERTIES, hint="")
-    mass = read_mass(tmp_path)
+    mass = read_measured(tmp_path).mass_kg
     told["mass"] = mass and [mass.value, mass.sigma]
     (tmp_path / PROPERTIES).write_text('{"mass_kg": {"value": 1}}')
-    with pytest.raises(TactileLabError, match="needs a finite value and sigma"):
-        read_mass(tmp_path)
+    with pytest.raises(TactileLabError, match="need finite values"):
+        read_measured(tmp_path)
     assert_baseline("evaluation/properties", told)
 
 

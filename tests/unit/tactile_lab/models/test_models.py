@@ -15,7 +15,9 @@ import yourdfpy
 from pxr import Usd, UsdGeom, UsdPhysics
 
 from drivers.core.errors import ConfigurationError, SessionDataError
+from sessions.perception.weighing.object_properties import Value
 from tactile_lab.evaluation.files.mesh_io import write_ply
+from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.prism import prism
 from tactile_lab.models import usd_file
 from tactile_lab.models.model_files import Format, write_model
@@ -68,6 +70,16 @@ def test_an_unknown_mass_is_assumed_and_told(tmp_path: Path) -> None:
     assumed = make_model(estimate(tmp_path), "angle")
     assert assumed.mass_is_assumed
     assert assumed.mass_kg == pytest.approx(600 * VOLUME_m3)
+
+
+def test_what_was_measured_is_in_the_model_unless_somebody_states_otherwise(tmp_path: Path) -> None:
+    measured = MeasuredBody(Value(0.2, 0.01), np.array([0.003, -0.004]), Value(0.35, 0.03))
+    file = estimate(tmp_path)
+    model = make_model(file, "angle", measured=measured)
+    assert (model.mass_kg, model.mass_is_assumed, model.friction) == (0.2, False, 0.35)
+    np.testing.assert_allclose(model.centre_m, [0.003, -0.004, HEIGHT_m / 2], atol=1e-12)
+    stated = make_model(file, "angle", MASS_kg, FRICTION, measured)
+    assert (stated.mass_kg, stated.friction) == (MASS_kg, FRICTION)
 
 
 def test_the_uncertainty_is_told_beside_the_model(folder: Path) -> None:
