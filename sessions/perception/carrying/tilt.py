@@ -15,6 +15,8 @@ _SPAN_s = 0.15
 """At either end, over which normals are averaged."""
 _LEAST_rad, _FIT_rad = float(np.deg2rad(12.0)), float(np.deg2rad(6.0))
 _LEAST_FINGERS = 3
+_LEAST_SPREAD = 0.3
+"""Normals that all have nearly one direction do not show a turn about it; what noise makes of that does not count."""
 
 
 def tilt_rad(steps: TipSteps) -> float:
@@ -26,7 +28,7 @@ def tilt_rad(steps: TipSteps) -> float:
         return 0.0
     rises = last[both, 2] - first[both, 2]
     across = np.column_stack([last[both, 1], -last[both, 0]])  # z of (axis x normal), by the axis' x and y
-    axis, *_ = np.linalg.lstsq(across, rises, rcond=None)
+    axis, *_ = np.linalg.lstsq(across, rises, rcond=_LEAST_SPREAD)
     leaning_rad, rest = float(np.linalg.norm(axis)), rises - across @ axis
     fits = float(np.sqrt(np.mean(rest**2))) < max(_FIT_rad, leaning_rad / 3)
     return leaning_rad if fits and leaning_rad > _LEAST_rad else 0.0

@@ -43,5 +43,13 @@ def test_fingertips_that_slide_up_a_round_side_are_no_tilt():
     assert tilt_rad(steps) == 0.0
 
 
+def test_nearly_parallel_normals_do_not_show_a_turn_about_themselves():
+    """Two degrees of noise are no lean by 45 degrees about the direction of all normals."""
+    steps = carried(BOX, object_motion=STILL, palm_motion=STILL)
+    steps.normals[..., 0] = np.radians([0.0, 2.0, -2.0, 1.0, 0.0])
+    steps.normals[len(steps) // 2 :, :, 2] = np.radians([0.0, 2.0, -2.0, 1.0, 0.0])
+    assert tilt_rad(steps) == 0.0
+
+
 def test_two_fingertips_do_not_tell_it():
     assert tilt_rad(leaning(BOX, 25.0, felt=("MF", "TH"))) == 0.0
