@@ -29,6 +29,8 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         solids.EVERYDAY_SHAPE,
         solids.KNOWN_SHAPE,
         solids.SOLID_LIMIT,
+        solids.FELT_3D,
+        solids.FELT_LIMIT,
         solids.METHODS_6DOF,
         ablation.ABLATION,
         consistency.CONSISTENCY,

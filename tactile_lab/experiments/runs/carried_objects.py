@@ -14,7 +14,7 @@ from gtsam import Pose2, Pose3
 
 from drivers.core.contacts import Array, Grasp, StepSigma
 from drivers.core.poses import planar
-from drivers.simulation.object_names import MESH_PREFIX
+from drivers.simulation.object_names import LYING, MESH_PREFIX, in_pose
 from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import GraspReport, NullProgress
@@ -145,11 +145,12 @@ def watch_carries(
 ) -> tuple[SessionOutcome, CarryWatch]:
     """A session of the fixed rule, in which the object is carried after every grasp but the last.
 
+    Scans lie: one that stands is grasped from the side, and such a hand carries nothing.
+
     Raises ConfigurationError: the object is a scan, and the scans are not on this machine.
     """
     rig, is_scan = _rig_with(mass_kg), object_name.startswith(YCB_PREFIX)
-    on_rig = f"{MESH_PREFIX}{ycb_path(object_name.removeprefix(YCB_PREFIX))}" if is_scan else object_name
-    world = simulated_world(rig, seed, on_rig)
+    world = simulated_world(rig, seed, _lying(object_name) if is_scan else object_name)
     runtime = build_runtime(rig, world, NullRecorder())
     watch = CarryWatch(world, runtime, seed)
     runtime.observer.interpreter.listener = watch.on_sample
@@ -161,6 +162,10 @@ def watch_carries(
         return Conductor(runtime, settings, roles, watch).run(), watch
     finally:
         runtime.close()
+
+
+def _lying(scan: str) -> str:
+    return in_pose(f"{MESH_PREFIX}{ycb_path(scan.removeprefix(YCB_PREFIX))}", LYING)
 
 
 def _rig_with(mass_kg: float) -> Rig:

@@ -27,6 +27,8 @@ CURVED_SOLIDS = ("ellipsoid", "cylinder", "sphere", "mug", "bottle")
 SCANNED_SOLIDS = tuple(YCB_PREFIX + name for name in YCB_NAMES)
 EVERYDAY_SCANS = tuple(YCB_PREFIX + name for name in (*YCB_NAMES, *MORE_YCB_NAMES))
 SPATIAL_GRASPS = 24
+FELT_NOISE = 10
+"""Motion noise, percent, that odometry in the hand stays below: 1 mm and 2 degrees a step."""
 
 
 def scans_left_out(scans: tuple[str, ...] = SCANNED_SOLIDS) -> str:
@@ -69,6 +71,15 @@ def _known_on_table(grasps: int) -> list[Setting]:
 def _limits_on_table(grasps: int) -> list[Setting]:
     methods = contact_limit.METHODS
     return grid(noise=[100], sides=contact_limit.SIDES, shape=FACETED_SOLIDS, method=methods, grasps=[grasps])
+
+
+def _felt_on_table(grasps: int) -> list[Setting]:
+    return grid(noise=[FELT_NOISE], shape=FACETED_SOLIDS, method=("known-pose", "joint"), grasps=[grasps])
+
+
+def _felt_limits(grasps: int) -> list[Setting]:
+    methods = contact_limit.METHODS
+    return grid(noise=[FELT_NOISE], sides=contact_limit.SIDES, shape=FACETED_SOLIDS, method=methods, grasps=[grasps])
 
 
 def _methods_in_space(grasps: int) -> list[Setting]:
@@ -159,6 +170,28 @@ SOLID_LIMIT = Experiment(
     "solid-limit",
     "The best that any estimate of a flat-faced solid can reach from these grasps, with poses known or estimated.",
     _limits_on_table,
+    solid_limit.limit_of_solid,
+    (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION),
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: f"sides {cell['sides']}"),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+)
+
+FELT_3D = Experiment(
+    "felt-3d",
+    "Solids moved on a table at 10 % motion noise, which odometry in the hand stays below.",
+    _felt_on_table,
+    tracking_runs.track_on_table,
+    TRACKING_COLUMNS,
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: str(cell["shape"])),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+)
+
+FELT_LIMIT = Experiment(
+    "felt-limit",
+    "The best that any estimate of a flat-faced solid can reach from these grasps at 10 % motion noise.",
+    _felt_limits,
     solid_limit.limit_of_solid,
     (AGAINST_KNOWN, MEAN_DISTANCE, REGISTRATION),
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", lambda cell: f"sides {cell['sides']}"),

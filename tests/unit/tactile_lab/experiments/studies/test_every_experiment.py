@@ -20,6 +20,8 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "everyday-3d": ({"shape": ["wedge"], "method": ["known-pose"]}, 4),
     "everyday-shape": ({"shape": ["wedge"], "without": ["nothing"]}, 5),
     "solid-limit": ({"shape": ["triangular-prism"]}, 4),
+    "felt-3d": ({"shape": ["l-block"]}, 4),
+    "felt-limit": ({"shape": ["triangular-prism"]}, 4),
     "known-shape": ({"shape": ["cylinder"]}, 3),
     "methods-6dof": ({"shape": ["ellipsoid"], "method": ["known-pose", "icp"]}, 4),
     "ablation": ({"shape": ["ellipse"], "condition": ["in the plane"], "without": ["nothing", "faces", "splicing"]}, 4),
