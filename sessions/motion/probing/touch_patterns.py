@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from drivers.shadow.closing.closing import Closing
+from drivers.shadow.closing.posture import HandShape
+from drivers.shadow.closing.tip_motion import motor_rates
 
 
 @dataclass(frozen=True)
@@ -16,17 +20,19 @@ class Pattern:
         closing: its paths.
         progress: position on them, by finger.
         held_rad: joint angles of fingers that are held out of the way, by finger and motor.
+        shifted_rad: additional motor angles of fingers that are held back a little, by motor.
     """
 
     closing: str
     progress: Mapping[str, float]
     held_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    shifted_rad: Mapping[str, float] = field(default_factory=dict)
 
     def aside(self, table: Closing) -> dict[str, float]:
-        """Additional motor angles, relative to the closing's table, to hold those fingers, radians."""
+        """Additional motor angles, relative to the closing's table, to hold those fingers, or to hold them back."""
         wanted = {motor: angle for motors in self.held_rad.values() for motor, angle in motors.items()}
         tabled = {m: a for finger in self.held_rad for m, a in table.joints(finger, self.progress[finger]).items()}
-        return {motor: wanted[motor] - angle for motor, angle in tabled.items()}
+        return {**self.shifted_rad, **{motor: wanted[motor] - angle for motor, angle in tabled.items()}}
 
 
 TAP = Pattern("radial", {"FF": 0.70, "MF": 0.86, "RF": 0.78, "LF": 0.68, "TH": 0.62})
@@ -44,3 +50,22 @@ COLUMN = Pattern("pinch", {"FF": 0.75, "MF": 0.75, "RF": 0.75, "LF": 0.75, "TH":
 
 TAP_HEIGHT_m = 0.022
 """Height of the closing's table; the positioner adds the rest."""
+
+_HELD_BACK_m = 0.010
+
+
+def lowest_ahead(table: Closing, hand: HandShape, up_to_m: float) -> Pattern:
+    """The column, with the lowest fingertips 10 mm ahead of the others: an object that is met low down does not tip.
+
+    Args:
+        table: the closing that it belongs to, palm upright.
+        hand: that has it.
+        up_to_m: fingertips up to this height are all ahead, otherwise only the lowest.
+    """
+    tips_m = {finger: table.path(finger).centre_m(COLUMN.progress[finger]) for finger in table.fingers}
+    heights_m = {finger: float(place[2]) for finger, place in tips_m.items() if finger != "TH"}
+    lowest_m = min(heights_m.values())
+    rates = motor_rates(table, COLUMN.progress, -np.array(table.approach), hand)
+    behind = [finger for finger, height_m in heights_m.items() if height_m > max(up_to_m, lowest_m)]
+    shifted_rad = {motor: _HELD_BACK_m * rate for finger in behind for motor, rate in rates[finger].items()}
+    return replace(COLUMN, shifted_rad=shifted_rad)

@@ -20,7 +20,7 @@ from sessions.motion.cycle_settings import CycleSettings, TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.guard import Guard
 from sessions.motion.motion import Motion
-from sessions.motion.probing.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m
+from sessions.motion.probing.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m, lowest_ahead
 from sessions.motion.travel import travel_height_m
 from sessions.perception.approach_paths import TipSurface
 
@@ -125,9 +125,9 @@ class Toucher:
         s, motion = self.settings, self._motion
         lowest_m = s.side_heights_m[0 if side == side_with_first_finger_down(self._hand.form) else 1]
         table = closing(sideways(COLUMN.closing, side), height_m or lowest_m, self._hand)
-        lane = frame.shifted_inside(np.array([-s.row_m, 0.0]))
+        lane, column = frame.shifted_inside(np.array([-s.row_m, 0.0])), lowest_ahead(table, self._hand, all_up_to_m)
         known = len(motion.runtime.perception.probed)
-        self._poise(table, COLUMN, lane, from_m)
+        self._poise(table, column, lane, from_m)
         begin, end = (motion.base_joints(lane, table, 0.0, away_m) for away_m in (from_m, -s.beyond_m))
         self.guard.restart()
         if not motion.probe_base(begin, self._cycle.beside_m_s, self.guard.is_met):
@@ -138,7 +138,7 @@ class Toucher:
         landed = np.empty((0, 3))
         if self._approach(end, s.side_m_s):
             landed = self._landing_points(np.array(table.approach), lane)
-            self._lay_on(table, COLUMN, np.array(table.approach), lane, s.rake_N, 0.0, all_up_to_m)
+            self._lay_on(table, column, np.array(table.approach), lane, s.rake_N, 0.0, all_up_to_m)
             self.capture()
         motion.move_base(begin, *self._travel)
         self._rise_over(lane, table, from_m)
@@ -287,7 +287,7 @@ class Toucher:
                 gone_m[finger] = float(np.clip(gone_m[finger] + moved_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)
             for finger in rates.keys() - pattern.held_rad.keys():
-                aside |= {motor: rate * gone_m[finger] for motor, rate in rates[finger].items()}
+                aside |= {motor: aside.get(motor, 0.0) + r * gone_m[finger] for motor, r in rates[finger].items()}
             motion.set_fingers(table, pattern.progress, aside)
             motion.tick()
 

@@ -125,11 +125,11 @@ class TouchPlanner:
 
 
 def _touched(front_m: Array, height_m: float, top_m: float) -> dict[str, Array]:
-    """Where fingertips one above the other meet a side: all that are low; else whichever meets it first."""
+    """Where fingertips one above the other meet a side: all that are low; else the lowest, which is ahead."""
     heights_m = height_m + _FINGERS_APART_m * np.arange(4)
     met_m = heights_m[heights_m < min(LOW_m, top_m)]
     if not len(met_m):
-        met_m = heights_m[heights_m < max(top_m, height_m + 1e-9)].mean(keepdims=True)
+        met_m = heights_m[:1]
     return {finger: np.array([*front_m, z]) for finger, z in zip(FINGERS, met_m, strict=False)}
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.core.contacts import FINGERS, Array, Grasp
-from drivers.shadow.closing.closing import closing
+from drivers.shadow.closing.closing import closing, sideways
 from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.closing.tip_motion import motor_rates
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal_matrices
@@ -15,7 +15,7 @@ from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import Motion
-from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
+from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m, lowest_ahead
 from sessions.motion.probing.touching import Toucher
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.recording.session_events import EventKind
@@ -200,6 +200,27 @@ def test_fingertips_move_where_the_rates_say() -> None:
                 moved[joint] += share * rate * way_m
     gone_m = (tips_m(moved) - tips_m(angles))[:4]
     np.testing.assert_allclose(gone_m, np.tile(way_m * down, (4, 1)), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("side", "up_to_m", "ahead"), [("left", 0.045, "FF MF"), ("left", 0.0, "FF"), ("right", 0.045, "LF")]
+)
+def test_the_lowest_fingertips_of_a_column_are_ahead_of_the_others(side: str, up_to_m: float, ahead: str) -> None:
+    height_m = {"left": 0.020, "right": 0.032}[side]
+    table = closing(sideways(COLUMN.closing, side), height_m, HandShape())
+    column = lowest_ahead(table, HandShape(), up_to_m)
+    angles = {name: a for finger in FINGERS for name, a in table.angles_rad(finger, COLUMN.progress[finger]).items()}
+    moved = dict(angles)
+    for motor, more_rad in column.aside(table).items():
+        pair = {f"{motor[:2]}J1": 0.375, f"{motor[:2]}J2": 0.625} if motor.endswith("J0") else {motor: 1.0}
+        for joint, share in pair.items():
+            moved[joint] += share * more_rad
+    way = table.grasp_T_palm.rotation().matrix().T @ np.array(table.approach)
+    centre_m = np.append(HandShape().centre_distal_m, 1.0)
+    before, after = (palm_T_distal_matrices(joint_vector(each)) @ centre_m for each in (angles, moved))
+    forward_m = (after - before)[:4, :3] @ way
+    behind = [finger not in ahead.split() for finger in LONG_FINGERS]
+    np.testing.assert_allclose(forward_m, np.where(behind, -0.010, 0.0), atol=2e-3)
 
 
 def test_thumb_is_not_moved_up_and_down() -> None:
