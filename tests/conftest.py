@@ -33,12 +33,16 @@ def pytest_xdist_auto_num_workers() -> int:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """What is collected stays to the end: looking through it for garbage again and again takes a fifth of the time."""
+    """What is collected stays to the end: looking through it for garbage again and again takes a fifth of the time.
+
+    Afterwards garbage is looked for as rarely as the program itself looks for it.
+    """
     gc.disable()
     try:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(10_000)
         gc.enable()
 
 

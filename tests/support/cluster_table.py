@@ -23,8 +23,8 @@ from pathlib import Path
 from tactile_lab.experiments.cells import Cell, Row, grid
 from tactile_lab.experiments.runner import RunnerSettings, kept_rows, run_cells
 from tactile_lab.experiments.studies.planar import PLANAR_SHAPES
-from tests.support.cluster_work import measured
 from tests.support.dask_cluster import DaskCluster
+from tests.support.measured_runs import measured
 from tests.support.repository import REPOSITORY
 from tests.support.stored_table import GrowingTable, Outline, parser
 

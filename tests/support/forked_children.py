@@ -1,4 +1,4 @@
-"""Child processes of the drivers as copies of the test's process, which has loaded their modules already.
+"""Child processes of drivers, estimators and pages as copies of the test's process, which has loaded their modules.
 
 A new interpreter spends most of a second with loading, and every test of a hand starts two. A copy becomes what the new
 interpreter would have been: same pipes, environment, process group, signals and arguments; only how it came to its
@@ -21,12 +21,14 @@ from typing import Any, NoReturn
 import pytest
 
 from drivers.core import child_process
+from tactile_lab import process_feed
 
 FORKED = (
     "drivers.emulators.ati.net_box_process",
     "drivers.emulators.ethercat.server",
     "drivers.shadow.device.hand_worker",
     "tactile_lab.autonomy.estimator_worker",
+    "tactile_lab.view.process",
 )
 
 
@@ -41,17 +43,18 @@ class ForkedChild(subprocess.Popen[bytes]):
         import_module(module)
         self.pid = os.fork()
         if self.pid == 0:
-            _become(module, env, stdin=pipes[0], stdout=pipes[3])
+            _become(module, env, stdin=pipes[0], stdout=pipes[3], stderr=pipes[5])
         self._child_created = True
         self._close_pipe_fds(*pipes)  # type: ignore[attr-defined]
 
 
-def _become(module: str, environment: dict[str, str], stdin: int, stdout: int) -> NoReturn:
+def _become(module: str, environment: dict[str, str], stdin: int, stdout: int, stderr: int) -> NoReturn:
     code = 1
     try:
         os.setpgid(0, 0)
-        os.dup2(stdin, 0)
-        os.dup2(stdout, 1)
+        for number, stream in enumerate((stdin, stdout, stderr)):
+            if stream >= 0:  # otherwise it is this process's own
+                os.dup2(stream, number)
         os.closerange(3, 1024)
         for number in (signal.SIGTERM, signal.SIGALRM, signal.SIGCHLD, signal.SIGHUP):
             signal.signal(number, signal.SIG_DFL)
@@ -77,9 +80,10 @@ def _become(module: str, environment: dict[str, str], stdin: int, stdout: int) -
 
 @contextmanager
 def forked_children() -> Iterator[None]:
-    """Within the block the drivers' processes are forked."""
+    """Within the block the processes of drivers, estimators and pages are forked."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(child_process, "subprocess", _Subprocess())
+        for starter in (child_process, process_feed):
+            patch.setattr(starter, "subprocess", _Subprocess())
         yield
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ import pytest
 from drivers.core.installed.extras import EXTRAS
 
 HIDDEN = """
+import json
 import sys
 
 class Hidden:
@@ -22,18 +25,29 @@ class Hidden:
 
 sys.meta_path.insert(0, Hidden)
 from tactile_lab.cli.main import main
-main(sys.argv[1:])
+
+codes = []
+for words in json.loads(sys.argv[1]):
+    try:
+        main(words)
+    except SystemExit as ended:
+        codes.append(ended.code or 0)
+print(json.dumps(codes))
 """
 
 
-def base(*words: object, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run ``tactile-lab`` where no package of an extra can be imported."""
-    code = HIDDEN.replace("NAMES", repr(set(EXTRAS)))
-    command = [sys.executable, "-c", code, *map(str, words)]
+def base(*commands: Sequence[object], cwd: Path) -> tuple[list[int], str]:
+    """Run ``tactile-lab`` where no package of an extra can be imported, command after command in one process.
+
+    Returns:
+        exit codes, and what was said on standard error.
+    """
+    words = json.dumps([list(map(str, each)) for each in commands])
+    command = [sys.executable, "-c", HIDDEN.replace("NAMES", repr(set(EXTRAS))), words]
     environment = os.environ | {"COLUMNS": "200", "NO_COLOR": "1"}
     done = subprocess.run(command, capture_output=True, text=True, cwd=cwd, env=environment, timeout=300, check=False)
     assert "Traceback" not in done.stderr, done.stderr
-    return done
+    return json.loads(done.stdout.splitlines()[-1]), done.stderr
 
 
 def test_a_session_is_evaluated_reported_and_exported(session_copy: Path) -> None:
@@ -41,31 +55,32 @@ def test_a_session_is_evaluated_reported_and_exported(session_copy: Path) -> Non
     before = {name: (results / name).read_bytes() for name in ("evaluation.json", "report.html", "truth.csv")}
     report = results / "report.html"
     report.unlink()
-    for words in (("evaluate", session_copy), ("report", session_copy), ("session", "list", "--root", ".")):
-        done = base(*words, cwd=session_copy.parent)
-        assert done.returncode == 0, done.stderr
+    commands: list[tuple[object, ...]] = [
+        ("evaluate", session_copy),
+        ("report", session_copy),
+        ("session", "list", "--root", "."),
+        ("model", "export", session_copy, "--out", "model", "--format", "stl,urdf"),
+    ]
+    codes, said = base(*commands, cwd=session_copy.parent)
+    assert codes == [0] * len(commands), said
     assert {name: (results / name).read_bytes() for name in before} == before
-    done = base("model", "export", session_copy, "--out", "model", "--format", "stl,urdf", cwd=session_copy.parent)
-    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.long
 def test_bytes_and_contacts_are_estimated_again(session_copy: Path) -> None:
-    folder = session_copy.parent
-    done = base("session", "replay", session_copy, cwd=folder)
-    assert done.returncode == 0, done.stderr
-    for name in ("trajectory.csv", "mesh.ply", "truth.csv"):
-        assert (session_copy / "replay" / name).read_bytes() == (session_copy / "results" / name).read_bytes()
-    for words in (
+    commands: list[tuple[object, ...]] = [
+        ("session", "replay", session_copy),
         ("session", "export", session_copy, "--contacts", "log.json"),
         ("reconstruct", "log.json", "--out", "again", "--json"),
-    ):
-        done = base(*words, cwd=folder)
-        assert done.returncode == 0, done.stderr
+    ]
+    codes, said = base(*commands, cwd=session_copy.parent)
+    assert codes == [0] * len(commands), said
+    for name in ("trajectory.csv", "mesh.ply", "truth.csv"):
+        assert (session_copy / "replay" / name).read_bytes() == (session_copy / "results" / name).read_bytes()
 
 
-@pytest.mark.parametrize("words", [("evaluate", "{session}", "--from", "pictures"), ("markers", "single")])
-def test_what_looks_at_pictures_names_its_extra(recorded: Path, tmp_path: Path, words: tuple[str, ...]) -> None:
-    done = base(*(word.format(session=recorded) for word in words), cwd=tmp_path)
-    assert done.returncode == 2
-    assert "the package cv2 of the extra [camera] is not installed. Install it: python3 -m pip" in done.stderr
+def test_what_looks_at_pictures_names_its_extra(recorded: Path, tmp_path: Path) -> None:
+    codes, said = base(("evaluate", recorded, "--from", "pictures"), ("markers", "single"), cwd=tmp_path)
+    assert codes == [2, 2]
+    missing = "the package cv2 of the extra [camera] is not installed. Install it: python3 -m pip"
+    assert said.count(missing) == 2

@@ -20,7 +20,7 @@ from drivers.core.errors import CodecError, ConfigurationError, DeviceError
 PATIENT = CameraDeviceSettings(timeout_ms=20_000.0)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def transport() -> Iterator[CameraProcess]:
     process = CameraProcess("camera", CameraSourceSettings(source="simulated", size_px=(320, 240)))
     process.open()
@@ -29,7 +29,7 @@ def transport() -> Iterator[CameraProcess]:
     process.close()
 
 
-def test_every_frame_sends_its_corners_and_a_trigger_brings_a_picture(transport: CameraProcess) -> None:
+def test_every_frame_sends_its_corners_a_trigger_brings_a_picture_and_all_are_counted(transport: CameraProcess) -> None:
     camera = Camera(transport, MonotonicClock(), PATIENT)
     camera.connect()
     frames = [camera.capture() for _ in range(2)]
@@ -46,16 +46,14 @@ def test_every_frame_sends_its_corners_and_a_trigger_brings_a_picture(transport:
     assert all(frame.image is None and frame.detection is not None for frame in unasked)
     assert all(len(packet.payload) < 200 for packet in packets)
     camera.poll()
-
-
-def test_the_process_reports_its_frames_and_markers(transport: CameraProcess) -> None:
     report = transport.report()
     assert report["frames"] > 0
     assert report["markers"] == 2 * report["frames"]
     assert report["dropped_blocks"] == 0
 
 
-def test_only_triggers_are_taken(transport: CameraProcess) -> None:
+def test_only_triggers_are_taken() -> None:
+    transport = CameraProcess("camera", CameraSourceSettings(source="simulated"))
     with pytest.raises(CodecError, match="not a trigger"):
         transport.send(b"SMILE")
 
@@ -74,20 +72,14 @@ def _until_it_ends(transport: CameraProcess) -> None:
         transport.receive()
 
 
-@pytest.mark.parametrize(
-    ("way", "words"),
-    [(signal.SIGKILL, "camera: its process has ended"), (signal.SIGSTOP, "camera: no picture within 1000 ms")],
-)
-def test_a_process_that_is_killed_or_stands_still_is_told(way: signal.Signals, words: str) -> None:
-    transport = CameraProcess("camera", CameraSourceSettings(source="simulated", size_px=(320, 240)))
+def test_a_process_that_stands_still_or_is_killed_is_told(transport: CameraProcess) -> None:
     camera = Camera(transport, MonotonicClock())
     camera.connect()
-    try:
+    for way, words in ((signal.SIGSTOP, "no picture within 1000 ms"), (signal.SIGKILL, "its process has ended")):
         os.kill(transport._child.process_id, way)
-        with pytest.raises(DeviceError, match=words):
+        with pytest.raises(DeviceError, match=f"camera: {words}"):
             camera.capture()
-    finally:
-        camera.close()
+    camera.close()
 
 
 def test_a_camera_that_can_not_be_opened_says_so_before_anything_runs(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def test_few_contacts_wait_for_more_while_the_object_stays(carried_m: float, ver
 
 @pytest.mark.parametrize("shape", ["rectangle", pytest.param("ellipse", marks=pytest.mark.long)])
 def test_the_default_method_tracks_at_full_motion_noise(shape: str) -> None:
-    data = simulate(shape, 1, count=10)
+    data = simulate(shape, 1, count=7)
     result = run(data)
     assert result.status == "complete"
     assert registration_mm(data, result) < 4.0
@@ -96,8 +96,8 @@ def test_the_thesis_s_filter_runs_and_says_which_grasps_it_could_not_place() -> 
 
 
 def test_a_solid_is_followed_and_meshed() -> None:
-    data = spatial_data.simulate("box-12x6x6", 1, count=6)
-    result = run(data, dimension=3, mesh_resolution_m=0.008)
+    data = spatial_data.simulate("box-12x6x6", 1, count=5)
+    result = run(data, dimension=3, mesh_resolution_m=0.01)
     assert registration_mm(data, result) < 6.0
     assert result.mesh is not None
     assert result.contour is None
@@ -199,7 +199,7 @@ def test_a_grasp_that_met_nothing_keeps_the_prediction_and_grows_uncertain(metho
 
 @pytest.mark.parametrize("method", ["joint", "particle"])
 def test_few_contacts_leave_a_large_uncertainty_and_are_survived(method: str) -> None:
-    data = simulate("rectangle", 5, count=7, motion_scale=0.5)
+    data = simulate("rectangle", 5, count=5, motion_scale=0.5)
     slam = TactileSlam(settings(method=method, particles=5_000), 0)
     for grasp in data.grasps:
         slam.step(with_contacts(grasp, 2 if grasp.index == 4 else 5))
@@ -277,7 +277,7 @@ def test_refused_grasp_is_taken_as_one_without_contacts() -> None:
 
 
 def test_the_number_of_threads_changes_nothing() -> None:
-    data = simulate("L", 5, count=4)
+    data = simulate("rectangle", 5, count=3)
     results = []
     for threads in (1, 2):
         with threadpool_limits(threads):

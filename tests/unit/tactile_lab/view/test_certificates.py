@@ -35,6 +35,7 @@ def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return certificate
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_a_page_with_a_certificate_is_encrypted_and_has_its_token_all_the_same(certificate: Path) -> None:
     trusting = ssl.create_default_context(cafile=str(certificate))
     with ViewFeed("127.0.0.1", 0, TOKEN, "test", certificate=str(certificate)) as feed:

@@ -315,13 +315,20 @@ def test_no_websocket_is_opened_without_the_token(page: ViewFeed, cookie: str) -
     assert answered.count(b"HTTP/1.1") == 1
 
 
-def test_page_makes_no_public_tunnel_and_is_reached_through_its_door_only() -> None:
-    """In a process of its own: viser leaves its event loop unclosed."""
+def test_page_is_drawn_again_and_again_makes_no_tunnel_and_is_reached_through_its_door_only() -> None:
+    """In a process of its own: viser leaves its event loop unclosed. What it warns of counts as an error."""
     code = """
 import os, socket
 from viser import _messages
 from tactile_lab.view.page import Page
+from tests.unit.tactile_lab.view.test_view import recorded
 with Page("127.0.0.1", 0, "", "test") as page:
+    for grasps in (1, 2, 1):
+        page.scene = recorded(grasps)
+        page.draw()
+        page.scene.surface.sigma_m[:] = 0.001 * grasps
+        page.scene.changed.add("object")
+        page.draw()
     print(_messages.ShareUrlRequest in page._inner._websock_server._incoming_handlers)
     listening = [line.split() for line in open("/proc/net/tcp").readlines()[1:]]
     files = (f"/proc/self/fd/{number}" for number in os.listdir("/proc/self/fd"))
@@ -334,30 +341,14 @@ with Page("127.0.0.1", 0, "", "test") as page:
     place = page._inner_door.path
 print(place.exists())
 """
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True)
+    words = [sys.executable, "-W", "error::UserWarning", "-c", code]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False, cwd=REPOSITORY)
+    assert done.returncode == 0, done.stderr
     tunnels, ports, status, left = done.stdout.split()[-4:]
     assert tunnels == "False"
     assert ports == "1"  # the gate's
     assert status == "403"
     assert left == "False"
-
-
-def test_page_is_drawn_again_and_again_without_a_complaint() -> None:
-    """In a process of its own, as above; what viser warns of counts as an error."""
-    code = """
-from tactile_lab.view.page import Page
-from tests.unit.tactile_lab.view.test_view import recorded
-with Page("127.0.0.1", 0, "", "test") as page:
-    for grasps in (1, 2, 1):
-        page.scene = recorded(grasps)
-        page.draw()
-        page.scene.surface.sigma_m[:] = 0.001 * grasps
-        page.scene.changed.add("object")
-        page.draw()
-"""
-    words = [sys.executable, "-W", "error::UserWarning", "-c", code]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False, cwd=REPOSITORY)
-    assert done.returncode == 0, done.stderr
 
 
 # --- the feed ------------------------------------------------------------------------------------------------------
@@ -377,6 +368,7 @@ def alive(pid: int | None) -> bool:
     return True
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_stopped_page_costs_messages_and_nothing_else() -> None:
     with ViewFeed("127.0.0.1", 0, "", "test") as feed:
         pid = feed.pid
@@ -387,6 +379,7 @@ def test_stopped_page_costs_messages_and_nothing_else() -> None:
     assert not alive(pid)
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_killed_page_costs_messages_and_nothing_else() -> None:
     with ViewFeed("127.0.0.1", 0, "", "test") as feed:
         pid = feed.pid
@@ -453,6 +446,7 @@ def test_page_says_what_is_pressed_and_nothing_that_it_must_not() -> None:
     assert [(request.ask, request.text) for request in feed.requests()] == [(Ask.CAPTURE, ""), (Ask.NOTE, "hello")]
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_page_that_can_not_open_is_told() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

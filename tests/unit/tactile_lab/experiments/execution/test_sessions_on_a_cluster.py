@@ -9,7 +9,7 @@ import pytest
 
 from tactile_lab.experiments.runner import kept_rows, run_cells
 from tests.support.cluster_table import NAME, cells_of, killed_on_the_way, same_rows
-from tests.support.cluster_work import measured
+from tests.support.measured_runs import measured
 
 SESSIONS = 16
 
