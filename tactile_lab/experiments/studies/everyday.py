@@ -62,6 +62,7 @@ EVERYDAY_OBJECTS = Experiment(
         Column("processor minutes", "cpu_minutes", 1, kind="median"),
     ),
     ranges("object", HAUSDORFF_LABEL, "hausdorff_mm", _panel, columns=1),
+    pooled=("object", "pose"),
     grasps=everyday_sessions.GRASPS,
     left_out=_scans_left_out,
 )
