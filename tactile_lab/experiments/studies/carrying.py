@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivers.simulation.objects import CATALOGUE
-from tactile_lab.experiments.cells import Setting, grid
+from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.runs.carried_objects import MASS_kg, carry_object
 from tactile_lab.experiments.runs.weighed_objects import weigh_object
@@ -22,6 +22,10 @@ def _carried(grasps: int) -> list[Setting]:
         *grid(object=[*CATALOGUE, *scans], mass_kg=[MASS_kg], weighed=[0], grasps=[grasps]),
         *grid(object=["box-10x6x4"], mass_kg=list(_OTHER_MASSES_kg), weighed=[0, 1], grasps=[grasps]),
     ]
+
+
+def _kind(cell: Cell) -> str:
+    return "of the catalogue" if cell["object"] in CATALOGUE else "scans, lying"
 
 
 CARRIES = Experiment(
@@ -52,6 +56,7 @@ CARRIES = Experiment(
     ),
     ranges("object", "odometry off at the next capture, mm", "worst_step_mm", lambda cell: f"{cell['mass_kg']} kg"),
     pooled=("object",),
+    kind=_kind,
     grasps=5,
     left_out=lambda: scans_left_out(EVERYDAY_SCANS),
 )
