@@ -21,8 +21,8 @@ _LARGEST_OBJECT_m = 2.0
 _LARGEST_WORKSPACE_m = 20.0
 """Contacts of one session that are farther apart must be in millimetres."""
 
-_MOST_GRASPS, _MOST_CONTACTS, _MOST_CORNERS = 10_000, 100, 2000
-"""Of a log, of one grasp, and of a true outline."""
+_MOST_GRASPS, _MOST_CONTACTS, _MOST_CORNERS, _MOST_ERRORS = 10_000, 100, 2000, 12
+"""Of a log, of one grasp, of a true outline, and of those that contacts of one finger share."""
 
 
 def _unit(vector: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -65,6 +65,7 @@ RigidRows = Annotated[tuple[Row, Row, Row, Row], AfterValidator(_rigid)]
 CovarianceRows = Annotated[tuple[Vector, Vector, Vector], AfterValidator(_covariance)]
 FingerName = Annotated[str, Field(min_length=1, max_length=40)]
 _Length = Annotated[float, _short(0.2, "millimetres")]
+_Moves = Annotated[tuple[float, ...], Field(min_length=1, max_length=_MOST_ERRORS)]
 _Angle = Annotated[float, _short(float(np.pi), "degrees")]
 
 
@@ -118,8 +119,24 @@ class ContactEntry(StrictModel):
     point_sigma_m: _Length | None = Field(default=None, gt=0.0)
     point_covariance_m2: CovarianceRows | None = None
     shared_covariance_m2: CovarianceRows | None = None
+    shared_moves_m: tuple[_Moves, _Moves, _Moves] | None = None
     normal_sigma_rad: _Angle | None = Field(default=None, gt=0.0)
     force_N: float | None = Field(default=None, ge=0.0)
+
+    @model_validator(mode="after")
+    def _shared_once(self) -> Self:
+        if self.shared_moves_m is None:
+            return self
+        if self.shared_covariance_m2 is not None:
+            raise ValueError("shared_moves_m says what shared_covariance_m2 says, and more: give one of them")
+        if len({len(row) for row in self.shared_moves_m}) > 1:
+            raise ValueError("the three rows of shared_moves_m need the same length, one number for each error")
+        if self.point_covariance_m2 is not None:
+            moves = np.array(self.shared_moves_m)
+            left = np.array(self.point_covariance_m2) - moves @ moves.T
+            if np.linalg.eigvalsh(left).min() < -1e-12:
+                raise ValueError("shared_moves_m moves the point farther than point_covariance_m2 says")
+        return self
 
 
 class LineEntry(StrictModel):

@@ -177,6 +177,7 @@ def _contact(entry: ContactEntry, document: Document) -> Contact:
         normal_sigma_rad=entry.normal_sigma_rad or document.normal_sigma_rad,
         force_N=entry.force_N or 0.0,
         shared_covariance_m2=None if entry.shared_covariance_m2 is None else np.array(entry.shared_covariance_m2),
+        shared_moves_m=None if entry.shared_moves_m is None else np.array(entry.shared_moves_m),
     )
 
 
@@ -233,6 +234,8 @@ def _contact_entry(contact: Contact, log: ContactLog, scale: Array) -> dict[str,
         entry["point_covariance_m2"] = covariance.tolist()
     if contact.shared_covariance_m2 is not None:
         entry["shared_covariance_m2"] = (contact.shared_covariance_m2 * np.outer(scale, scale)).tolist()
+    if contact.shared_moves_m is not None:
+        entry["shared_moves_m"] = (scale[:, None] * contact.shared_moves_m).tolist()
     if normal_sigma_rad != log.normal_sigma_rad:
         entry["normal_sigma_rad"] = normal_sigma_rad
     if contact.force_N:

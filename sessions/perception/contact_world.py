@@ -102,8 +102,8 @@ def _contact(
     normal = rotation @ tip.normal_distal
     moves = derivatives[:, :3, :3] @ tip.point_distal_m + derivatives[:, :3, 3]
     turns = _rotation_vectors(derivatives[:, :3, :3] @ rotation.T)
-    by_joints = joint_sigma_rad**2 * moves.T @ moves
-    covariance = rotation @ tip.point_covariance_m2 @ rotation.T + by_joints
+    by_joints = joint_sigma_rad * moves.T
+    covariance = rotation @ tip.point_covariance_m2 @ rotation.T + by_joints @ by_joints.T
     turn_covariance = joint_sigma_rad**2 * turns.T @ turns
     if mount is not None:
         mount_covariance, mount_turn = mount.at(point)
@@ -115,7 +115,7 @@ def _contact(
         point_covariance_m2=(covariance + covariance.T) / 2,
         normal_sigma_rad=float(np.sqrt(tip.normal_sigma_rad**2 + _tilt_variance(turn_covariance, normal))),
         force_N=tip.force_N,
-        shared_covariance_m2=by_joints,
+        shared_moves_m=by_joints,
     )
 
 

@@ -67,10 +67,10 @@ def _felt_by(grasp: Grasp, errors_m: dict[str, float], sigma_m: float) -> Grasp:
     contacts, moved = [], {}
     for contact in grasp.contacts:
         normal = contact.normal_world
-        step, shared = errors_m[contact.finger] * normal, sigma_m**2 * np.outer(normal, normal)
+        step, moves = errors_m[contact.finger] * normal, sigma_m * normal[:, None]
         moved[contact.finger] = step
-        placed = replace(contact, point_world_m=contact.point_world_m + step, shared_covariance_m2=shared)
-        contacts.append(replace(placed, point_covariance_m2=contact.point_covariance_m2 + shared))
+        placed = replace(contact, point_world_m=contact.point_world_m + step, shared_moves_m=moves)
+        contacts.append(replace(placed, point_covariance_m2=contact.point_covariance_m2 + moves @ moves.T))
     lines = [
         replace(line, start_world_m=line.start_world_m + step, end_world_m=line.end_world_m + step)
         for line in grasp.approach_paths

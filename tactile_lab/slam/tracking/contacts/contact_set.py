@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -14,6 +14,9 @@ from drivers.core.errors import TrackingError
 from tactile_lab.slam.tracking.contacts.free_space import fingertip_places, places_on_line
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 from tactile_lab.slam.tracking.contacts.shared_errors import NO_SHARED_ERRORS, SharedErrors
+
+_LEAST_OWN_SHARE = 0.01
+"""Of a contact's variance that is drawn anew: one that has nothing but its finger's errors would weigh without end."""
 
 LEAST_SIGMA_m, LEAST_SIGMA_rad = 1e-6, 1e-5
 """No contact is known better, whatever its covariance says: one that is known exactly has no finite weight."""
@@ -49,6 +52,13 @@ class ContactSet:
     @property
     def dimension(self) -> int:
         return int(self.points_m.shape[1])
+
+    @property
+    def sideways_sigma_m(self) -> Array:
+        """Standard deviation of each point along its face, shape (n,): errors are taken out along the normal only."""
+        if not self.shared.are_taken_out:
+            return self.point_sigma_m
+        return np.asarray(np.sqrt(self.point_sigma_m**2 + np.sum(self.shared.moves_m**2, axis=1)))
 
     @classmethod
     def of_grasp(cls, grasp: Grasp, dimension: int, origin_height_m: float) -> Self:
@@ -105,6 +115,21 @@ class ContactSet:
         """
         points, normals = space.to_object(world_T_object, self.points_m, self.normals)
         return ContactSet(points, normals, self.point_sigma_m, self.normal_sigma_rad, shared=self.shared)
+
+    def with_errors_taken_out(self, errors: Mapping[str, Array]) -> ContactSet:
+        """The contacts, and the free places before them, without the given errors that contacts of one finger share.
+
+        Args:
+            errors: of each finger, standard deviations, shape (k,); one that is missing has none.
+        """
+        shared = self.shared.of_count(len(self))
+        back = -shared.offsets_m(errors)[:, None] * self.normals
+        own = np.maximum(self.point_sigma_m**2 - shared.sigma_m**2, _LEAST_OWN_SHARE * self.point_sigma_m**2)
+        free = self.free_m.copy()
+        touching = self.free_of >= 0
+        free[touching] += back[self.free_of[touching]]
+        moved = replace(self, points_m=self.points_m + back, point_sigma_m=np.sqrt(own), free_m=free)
+        return replace(moved, shared=shared.taken_out())
 
     def select(self, mask: NDArray[np.bool_] | NDArray[np.intp]) -> ContactSet:
         """The contacts picked by a boolean or index array."""

@@ -28,15 +28,19 @@ class FacetCertainty:
     Attributes:
         faces: in the object frame.
         information_of_poses: inverse of the joint covariance of all poses but the first, the faces known no better
-            than by the contacts, shape (p, p).
+            than by the contacts, errors that were estimated given, shape (p, p).
         faces_by_poses: derivatives of each face's tilt and offset by those poses, shape (s d, p).
-        faces_by_fingers: change of each face's tilt and offset by one standard deviation of the error that contacts of
-            one finger share, while the poses adapt, shape (s d, fingers).
+        poses_by_errors: change of those poses by what remains unknown of errors that contacts of one finger share and
+            that were estimated, shape (p, m), by independent standard normal variables; m = 0 if none were.
+        faces_by_fingers: change of each face's tilt and offset by that, shape (s d, m). If none were estimated, by one
+            standard deviation of the error that contacts of one finger share, while the poses adapt, shape
+            (s d, fingers).
         faces_by_contacts: the same if each contact had such an error of its own, shape (s d, n).
     """
 
     faces: FlatFaces
     information_of_poses: Array
+    poses_by_errors: Array
     faces_by_poses: Array
     faces_by_fingers: Array
     faces_by_contacts: Array
@@ -51,14 +55,17 @@ class FacetCertainty:
         smoother, rows = FacetSmoother(contact_map, noise), contact_map.rows
         faces, _ = flat_faces(contact_map)
         faces = made_regular(contact_map, faces, smoother.information(rows, faces))
-        information = smoother.information(rows, faces)
+        information = smoother.information(rows, faces, given_errors=True)
         free = (len(rows) - 1) * contact_map.space.size
         by_poses = -np.linalg.solve(information[free:, free:], information[free:, :free])
         of_poses = information[:free, :free] + information[:free, free:] @ by_poses
         shared = contact_map.contacts_world.shared
+        by_errors = smoother.by_shared_errors(rows, faces)
         by_fingers = smoother.response(rows, faces, shared.displacements_m())[free:]
         by_contacts = smoother.response(rows, faces, shared.displacements_each_m())[free:]
-        return cls(faces, np.asarray((of_poses + of_poses.T) / 2), np.asarray(by_poses), by_fingers, by_contacts)
+        found = by_errors[free:] if by_errors.size else by_fingers
+        of_poses = np.asarray((of_poses + of_poses.T) / 2)
+        return cls(faces, of_poses, by_errors[:free], np.asarray(by_poses), found, by_contacts)
 
     def surface_change(self, places_m: Array, normals: Array) -> Array:
         """Derivatives of points on the faces, shape (q, d), along their normals by the poses, shape (q, p)."""

@@ -21,6 +21,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 from tactile_lab.slam.tracking.faces.face_extents import overhang
 from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, Neighbours, flat_faces, tangents
+from tactile_lab.slam.tracking.faces.joint_weights import JointWeights
 from tactile_lab.slam.tracking.faces.solid_face_extents import SolidFaceExtents
 
 _MOST_PLANES_SHARE = 0.25
@@ -75,6 +76,7 @@ class FacetSmoother:
         self._motion = MotionCost.of(contact_map, noise)
         self._world = contact_map.contacts_world
         self._grasp_of = contact_map.grasp_indices
+        self._weights = JointWeights.of(self._world)
 
     def fit(self, rows: Array, faces: FlatFaces, iterations: int) -> FacetedTrajectory:
         """The best poses and faces near the given ones, contacts keeping their faces (Levenberg-Marquardt).
@@ -123,10 +125,15 @@ class FacetSmoother:
                 refused.add((kept, dropped))
         return best
 
-    def information(self, rows: Array, faces: FlatFaces) -> Array:
-        """Gauss-Newton information by all poses but the first, then by each face's tilt and offset."""
+    def information(self, rows: Array, faces: FlatFaces, *, given_errors: bool = False) -> Array:
+        """Gauss-Newton information by all poses but the first, then by each face's tilt and offset.
+
+        Args:
+            rows, faces: the solution.
+            given_errors: as if the errors that contacts of one finger share were known, where they were estimated.
+        """
         at = self._rate(rows, faces)
-        return self._information(at, self._jacobian(at))
+        return self._information(at, self._jacobian_given_errors(at) if given_errors else self._jacobian(at))
 
     def response(self, rows: Array, faces: FlatFaces, displacements_m: Array) -> Array:
         """How poses but the first, and each face's tilt and offset, follow contacts that move along their normals.
@@ -143,24 +150,52 @@ class FacetSmoother:
         moved = jacobian[: len(displacements_m)].T @ (displacements_m / self._world.point_sigma_m[:, None])
         return np.asarray(-np.linalg.solve(self._information(at, jacobian), moved))
 
+    def shared_errors(self, at: FacetedTrajectory) -> Array:
+        """The likeliest errors that contacts of one finger share, standard deviations, shape (m,)."""
+        return self._weights.errors(self._away_m(at.faces, self._seen(at.rows)[0]) / self._world.point_sigma_m)
+
+    def by_shared_errors(self, rows: Array, faces: FlatFaces) -> Array:
+        """How poses but the first, and each face's tilt and offset, follow what remains unknown of these errors.
+
+        Args:
+            rows, faces: the solution.
+
+        Returns:
+            By independent standard normal variables, shape (unknowns, m).
+        """
+        at = self._rate(rows, faces)
+        jacobian = self._jacobian_given_errors(at)
+        return self._weights.unknown(self._information(at, jacobian), jacobian[: len(self._world)])
+
     def _rate(self, rows: Array, faces: FlatFaces) -> FacetedTrajectory:
         chi_square = float(np.sum(self._residuals(rows, faces) ** 2))
         return FacetedTrajectory(rows, faces, chi_square, self._motion.value(rows))
 
     def _residuals(self, rows: Array, faces: FlatFaces) -> Array:
         """Of values, of the normals' components one after the other, beyond the faces' ends, and of regularities."""
-        points, normals = self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
-        outward = faces.normals[faces.labels]
-        away = np.einsum("nd,nd->n", outward, points) - faces.offsets_m[faces.labels]
-        tilts = np.where(faces.leaning[:, None], 0.0, normals - outward)
-        parts = [away / self._world.point_sigma_m, (tilts / self._world.normal_sigma_rad[:, None]).T.ravel()]
+        points, normals = self._seen(rows)
+        away = self._away_m(faces, points) / self._world.point_sigma_m
+        tilts = np.where(faces.leaning[:, None], 0.0, normals - faces.normals[faces.labels])
+        parts = [
+            self._weights.whiten(away),
+            (tilts / self._world.normal_sigma_rad[:, None]).T.ravel(),
+        ]
         if points.shape[1] == 2:
             over = overhang(points, faces.labels, faces.normals, faces.offsets_m)
-            parts.append(over.beyond_m * faces.bounded / self._world.point_sigma_m)
+            parts.append(over.beyond_m * faces.bounded / self._world.sideways_sigma_m)
         if self._ends is not None:
             parts.append(np.maximum(self._ends.beyond(points, faces.normals, faces.offsets_m), 0.0))
         parts.append(faces.irregularity() / _REGULAR_rad)
         return np.concatenate(parts)
+
+    def _seen(self, rows: Array) -> tuple[Array, Array]:
+        """Points and normals of the contacts, object frame."""
+        return self._space.to_object(rows[self._grasp_of], self._world.points_m, self._world.normals)
+
+    @staticmethod
+    def _away_m(faces: FlatFaces, points: Array) -> Array:
+        """How far contacts lie outside of their faces, shape (n,)."""
+        return np.asarray(np.einsum("nd,nd->n", faces.normals[faces.labels], points) - faces.offsets_m[faces.labels])
 
     def _normal_equations(self, at: FacetedTrajectory) -> tuple[Array, Array]:
         """Gauss-Newton information and gradient by all poses but the first, then by each face's tilt and offset."""
@@ -179,8 +214,14 @@ class FacetSmoother:
 
     def _jacobian(self, at: FacetedTrajectory) -> Array:
         """Derivatives of the residuals."""
+        jacobian, count = self._jacobian_given_errors(at), len(self._world)
+        jacobian[:count] = self._weights.whiten(jacobian[:count])
+        return jacobian
+
+    def _jacobian_given_errors(self, at: FacetedTrajectory) -> Array:
+        """The same before those of contacts that share errors are made uncorrelated."""
         rows, faces, world = at.rows, at.faces, self._world
-        points, normals = self._space.to_object(rows[self._grasp_of], world.points_m, world.normals)
+        points, normals = self._seen(rows)
         count, dimension = points.shape
         contact, still, each = np.arange(count), np.zeros_like(normals), rows[self._grasp_of]
         outward, along = faces.normals[faces.labels], tangents(faces.normals)[faces.labels]
@@ -200,7 +241,7 @@ class FacetSmoother:
             by_faces[lines, faces.labels, :-1] = -along[:, axis] * stiffness[:, None]
         if dimension == 2:
             over, lines = overhang(points, faces.labels, faces.normals, faces.offsets_m), 3 * count + contact
-            strength = (faces.bounded / world.point_sigma_m)[:, None]
+            strength = (faces.bounded / world.sideways_sigma_m)[:, None]
             by_poses[lines, self._grasp_of] = self._space.by_row(each, points, normals, over.ways, still) * strength
             by_faces[lines, :, 1] = over.by_offsets * strength
         if self._ends is not None:

@@ -98,7 +98,7 @@ def _outline_faces(contact_map: ContactMap) -> tuple[FlatFaces, Neighbours]:
         pairs = np.sort(np.column_stack([along[borders - 1], along[borders]]), axis=1)
         return [(int(one), int(other)) for one, other in np.unique(pairs, axis=0)]
 
-    bounded = between_ends(seen.points_m, labels, found.normals, found.offsets_m, seen.point_sigma_m)
+    bounded = between_ends(seen.points_m, labels, found.normals, found.offsets_m, seen.sideways_sigma_m)
     bounded &= "face extents" not in contact_map.settings.without
     return FlatFaces(labels, found.normals, found.offsets_m, leaning, bounded), in_turn
 

@@ -20,6 +20,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.fixed_lag import unfold
 from tactile_lab.slam.tracking.evidence.motion_cost import estimated_noise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
+from tactile_lab.slam.tracking.faces.resolved_errors import with_errors_resolved
 from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 from tactile_lab.slam.tracking.joint.branching import Branching
 from tactile_lab.slam.tracking.joint.deferred_association import Relocate, propose_pushes, relocate_last
@@ -218,6 +219,7 @@ class JointTracker:
             self._share_best_kernel()
         faceted = opinions.with_faces([opinions.place_deferred(one) for one in self._hypotheses])
         self._rivals = opinions.rivals
+        faceted[0] = replace(faceted[0], map=with_errors_resolved(faceted[0].map, self._noise))
         found = PoseCovariances.of(faceted[0].map, self._noise)
         faceted[0] = replace(faceted[0], map=with_covariances(faceted[0].map, found.birth))
         self._common_covariances = found.common

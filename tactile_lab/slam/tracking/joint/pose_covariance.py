@@ -44,7 +44,7 @@ class PoseCovariances:
         count, size = len(contact_map.placed), contact_map.space.size
         joint = _palm(contact_map, noise)
         if count > 1:
-            joint[size:, size:] += np.linalg.inv(_information(contact_map, noise))
+            joint[size:, size:] += _of_poses(contact_map, noise)
         born, centred = (np.eye(count * size) - frame for frame in _frames(contact_map))
         return cls(_blocks(born @ joint @ born.T, size), _blocks(centred @ joint @ centred.T, size))
 
@@ -55,12 +55,14 @@ def with_covariances(contact_map: ContactMap, covariances: Array) -> ContactMap:
     return replace(contact_map, placed=(contact_map.placed[0], *later))
 
 
-def _information(contact_map: ContactMap, noise: MotionNoise) -> Array:
-    """Inverse of the joint covariance of all poses but the first."""
+def _of_poses(contact_map: ContactMap, noise: MotionNoise) -> Array:
+    """Joint covariance of all poses but the first."""
     try:
-        return FacetCertainty.of(contact_map, noise).information_of_poses
+        found = FacetCertainty.of(contact_map, noise)
     except (ShapeError, np.linalg.LinAlgError):  # the contacts enclose nothing, or too few of them form faces
-        return PoseEvidence(contact_map, noise).information(contact_map.rows)
+        return np.asarray(np.linalg.inv(PoseEvidence(contact_map, noise).information(contact_map.rows)))
+    given_errors = np.linalg.inv(found.information_of_poses)
+    return np.asarray(given_errors + found.poses_by_errors @ found.poses_by_errors.T)
 
 
 def _palm(contact_map: ContactMap, noise: MotionNoise) -> Array:

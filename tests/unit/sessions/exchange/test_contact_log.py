@@ -108,6 +108,36 @@ def test_what_the_contacts_of_a_finger_share_is_read_back(tmp_path):
         assert second.shared_covariance_m2 is None
 
 
+def test_how_each_error_of_a_finger_moves_a_contact_is_read_back(tmp_path):
+    moves = np.array([[4e-4, 1e-4], [2e-4, 0.0], [-1e-4, 3e-4]])
+    stating = replace(contact("FF", [0.01, 0.02, 0.03], [1, 0, 0]), shared_moves_m=moves)
+    for dimension, expected in ((3, moves), (2, moves * [[1], [1], [0]])):
+        path = tmp_path / f"{dimension}.json"
+        write_contact_log(path, log(dimension, [Grasp(0, 0, (stating,), Pose3())]))
+        (found,) = read_contact_log(path).grasps[0].contacts
+        np.testing.assert_array_equal(found.shared_moves_m, expected)
+        assert found.shared_covariance_m2 is None
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ({"shared_moves_m": [[1e-4], [0.0], [0.0, 0.0]]}, "same length"),
+        ({"shared_moves_m": [[], [], []]}, "at least 1"),
+        ({"shared_moves_m": [[1e-4], [0], [0]], "shared_covariance_m2": np.zeros((3, 3)).tolist()}, "give one of them"),
+        ({"shared_moves_m": [[2e-3], [0], [0]], "point_covariance_m2": (1e-6 * np.eye(3)).tolist()}, "farther than"),
+    ],
+)
+def test_moves_that_do_not_fit_are_refused(tmp_path, entry, message):
+    path = tmp_path / "log.json"
+    write_contact_log(path, log(3, [Grasp(0, 0, (contact("FF", [0.01, 0.02, 0.03], [1, 0, 0]),), Pose3())]))
+    document = json.loads(path.read_text())
+    document["grasps"][0]["contacts"][0].update(entry)
+    path.write_text(json.dumps(document))
+    with pytest.raises(ConfigurationError, match=message):
+        read_contact_log(path)
+
+
 def test_a_planar_log_keeps_the_horizontal_part(tmp_path):
     tilted = Pose3(Rot3.Ypr(0.3, 0.05, 0.02), np.array([0.01, 0.02, 0.004]))
     touches = (contact("FF", [0.01, 0.02, 0.03], [3, 4, 1]), contact("MF", [0.0, 0.0, 0.05], [0.1, 0, 1]))

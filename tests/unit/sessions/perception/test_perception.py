@@ -105,7 +105,10 @@ def test_point_covariance_contains_the_joint_angles_through_the_jacobian():
         expected = np.cov(points[:, index].T) + rotation @ TIP.point_covariance_m2 @ rotation.T
         np.testing.assert_allclose(contact.point_covariance_m2, expected, atol=0.05 * np.trace(expected))
         shared = np.cov(points[:, index].T)  # offsets of the joints: the same for all contacts of the finger
-        np.testing.assert_allclose(contact.shared_covariance_m2, shared, atol=0.05 * np.trace(shared))
+        moves = contact.shared_moves_m
+        assert moves is not None
+        assert moves.shape == (3, 5)
+        np.testing.assert_allclose(moves @ moves.T, shared, atol=0.05 * np.trace(shared))
         tilt = np.trace(np.cov(normals[:, index].T)) / 2
         assert contact.normal_sigma_rad == pytest.approx(np.sqrt(TIP.normal_sigma_rad**2 + tilt), rel=0.05)
 

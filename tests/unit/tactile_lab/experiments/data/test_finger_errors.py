@@ -20,8 +20,8 @@ def test_all_contacts_of_a_finger_move_along_their_normals_by_one_error_and_stat
             step, normal = other.point_world_m - one.point_world_m, one.normal_world
             steps.setdefault(one.finger, []).append(float(step @ normal))
             np.testing.assert_allclose(step, steps[one.finger][-1] * normal, atol=1e-12)
-            assert other.shared_covariance_m2 is not None
-            assert normal @ other.shared_covariance_m2 @ normal == pytest.approx(SIGMA_m**2)
+            assert other.shared_moves_m is not None
+            np.testing.assert_allclose(other.shared_moves_m, SIGMA_m * normal[:, None], atol=1e-12)
             assert normal @ other.point_covariance_m2 @ normal == pytest.approx(SIGMA_m**2 + POINT_SIGMA_m**2)
     errors_m = np.array([found[0] for found in steps.values()])
     assert all(np.ptp(found) < 1e-12 for found in steps.values())
