@@ -29,6 +29,7 @@ FORKED = (
     "drivers.shadow.device.hand_worker",
     "tactile_lab.autonomy.estimator_worker",
     "tactile_lab.view.process",
+    "tactile_lab.viewers.live.process",
 )
 
 

@@ -155,8 +155,7 @@ def test_help_may_be_read_in_part():
 @pytest.mark.parametrize(
     "changed",
     [
-        {"HOME": "/nonexistent"},
-        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
+        {"HOME": "/nonexistent", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"},
         pytest.param({"TMPDIR": "/nonexistent"}, marks=pytest.mark.long),
     ],
 )

@@ -123,7 +123,7 @@ def test_lens_without_a_picture_size_is_refused() -> None:
         TableCamera(lens, CameraSettings(), np.random.default_rng(0))
 
 
-def sightings(name: str, place: tuple[float, float, float], count: int = 4) -> tuple[np.ndarray, float]:
+def sightings(name: str, place: tuple[float, float, float], count: int = 2) -> tuple[np.ndarray, float]:
     """Error in the plane (m) and of the turn (rad) of the program's sighting of an object at rest."""
     x, y, yaw = place
     world = SimulatedWorld(SimulationSettings(object=name, start=ObjectStart(x_m=x, y_m=y, yaw_rad=yaw)), 1)

@@ -250,6 +250,7 @@ def run(work: Any) -> Any:
     raise AssertionError("it waits")
 
 
+@pytest.mark.usefixtures("quick_children")
 def test_a_port_that_is_taken_is_said_in_one_sentence(feed):
     port = int(feed.url.split(":")[2].partition("/")[0])
     with (

@@ -12,7 +12,7 @@ from tactile_lab.experiments.runs.limits.known_shape import follow_known_shape
 
 
 @cache
-def followed(shape: str, seed: int, *, noise: int = 100, particles: int = 20_000) -> float:
+def followed(shape: str, seed: int, *, noise: int = 100, particles: int = 8_000) -> float:
     setting = (("noise", noise), ("shape", shape), ("grasps", 6), ("particles", particles))
     return float(follow_known_shape(Cell(setting, seed))["registration_mm"])
 

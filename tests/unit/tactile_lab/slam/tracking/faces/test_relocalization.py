@@ -23,7 +23,7 @@ from tactile_lab.slam.tracking.joint.proposals import ProposalSettings
 from tests.support.simulated_contacts import true_map
 
 NOISE = MotionNoise()
-COUNT = 12
+COUNT = 10
 
 
 @pytest.fixture(scope="module")
