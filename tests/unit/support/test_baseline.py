@@ -18,6 +18,7 @@ VALUES = {"pose": np.array([0.1, -2.0]), "choice": "left", "count": np.int64(3),
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of the numbers, with VALUES stored in it."""
     monkeypatch.setattr(baseline, "FOLDER", tmp_path)
+    monkeypatch.delenv("BASELINE_SHARE", raising=False)
     monkeypatch.setenv("MAKE_BASELINES", "yes")
     assert_baseline("part/numbers", VALUES)
     monkeypatch.delenv("MAKE_BASELINES")
