@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -215,6 +216,12 @@ def test_contacts_that_do_not_make_a_shape_are_no_failure_of_its_model(
     assert "warnings" not in json.loads((tmp_path / "out" / "slam.json").read_text())
 
 
+@pytest.fixture(scope="module")
+def without(contact_log: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What is judged without the figure."""
+    return judged(contact_log, tmp_path_factory.mktemp("without") / "out").as_json()
+
+
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
@@ -226,9 +233,8 @@ def test_contacts_that_do_not_make_a_shape_are_no_failure_of_its_model(
     ],
 )
 def test_a_figure_that_fails_is_null_and_the_others_are_there(
-    written: Written, contact_log: Path, tmp_path: Path, answer: str, words: str
+    written: Written, contact_log: Path, without: dict[str, Any], tmp_path: Path, answer: str, words: str
 ) -> None:
-    without = judged(contact_log, tmp_path / "without").as_json()
     path = written("mine.py", FIGURE.format(answer=answer))
     load_extension(path)
     evaluation = judged(contact_log, tmp_path / "out")

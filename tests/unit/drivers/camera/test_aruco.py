@@ -42,10 +42,12 @@ def draw(markers: dict[int, tuple[Pose3, float]], seed: int = 0, noise: float = 
         corners = marker_corners(side_m * 480 / 360) @ pose[:3, :3].T + pose[:3, 3]
         target = (CAMERA.project(corners) + 0.5) * finer - 0.5
         source = np.array([[-0.5, -0.5], [479.5, -0.5], [479.5, 479.5], [-0.5, 479.5]])
-        warp = cv2.getPerspectiveTransform(source.astype(np.float32), target.astype(np.float32))
-        size = (640 * finer, 480 * finer)
-        cover = cv2.warpPerspective(np.full_like(tile, 255), warp, size)
-        picture = np.where(cover > 127, cv2.warpPerspective(tile, warp, size), picture)
+        low = np.clip(np.floor(target.min(axis=0)) - 2, 0, None).astype(int)
+        high = np.clip(np.ceil(target.max(axis=0)) + 3, None, (640 * finer, 480 * finer)).astype(int)
+        warp = cv2.getPerspectiveTransform(source.astype(np.float32), (target - low).astype(np.float32))
+        part = picture[low[1] : high[1], low[0] : high[0]]
+        cover = cv2.warpPerspective(np.full_like(tile, 255), warp, part.shape[::-1])
+        part[:] = np.where(cover > 127, cv2.warpPerspective(tile, warp, part.shape[::-1]), part)
     small = cv2.GaussianBlur(cv2.resize(picture, (640, 480), interpolation=cv2.INTER_AREA), (0, 0), 0.8)
     noisy = small + noise * np.random.default_rng(seed).standard_normal(small.shape)
     return np.asarray(np.clip(noisy, 0, 255), np.uint8)
@@ -155,7 +157,7 @@ def test_a_second_pose_is_ruled_out_only_above_the_corners_noise() -> None:
 def test_noise_does_not_make_the_wrong_pose_the_clearly_better_one() -> None:
     """At the worst tilts, nearly face-on: the surer it has to be the fewer are wrong, and of the clear ones none."""
     rng, wrong, clear = np.random.default_rng(5), {2.0: 0, 5.0: 0}, {2.0: 0, 5.0: 0}
-    for _ in range(1500):
+    for _ in range(1000):
         tilt = np.radians(rng.uniform(2.0, 8.0))
         truth = Pose3(Rot3.RzRyRx(np.pi + tilt, 0.0, rng.uniform(-3, 3)), np.array([0.0, 0.0, 0.5]))
         exact = CAMERA.project(transform_points(truth, marker_corners(0.035)))
@@ -165,9 +167,9 @@ def test_noise_does_not_make_the_wrong_pose_the_clearly_better_one() -> None:
             if not is_ambiguous(found, 0.1, sigmas):
                 clear[sigmas] += 1
                 wrong[sigmas] += errors_rad[0] > errors_rad[1]
-    assert clear[2.0] > 500
-    assert clear[5.0] > 20
-    assert 0 < wrong[2.0] < 0.05 * 1500
+    assert clear[2.0] > 333
+    assert clear[5.0] > 13
+    assert 0 < wrong[2.0] < 0.05 * 1000
     assert wrong[5.0] == 0
 
 
