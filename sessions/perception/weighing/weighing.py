@@ -17,8 +17,12 @@ from sessions.perception.carrying.net_wrench import NetWrench, net_wrench
 _GAIN = 0.01
 """Error of a force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""
 _LEAST_WEIGHT_N = 0.05
-_DRAG_N, _DRAG_SHARE = 0.02, 0.08
+_DRAG_N, _DRAG_SHARE = 0.08, 0.08
 """Error of a measured friction: an object that has only begun to slide is held back by less."""
+_HELD_BACK_N, _HELD_BACK_SHARE = 0.02, 0.025
+"""By how much an object that hangs free seems to be held back: noise, and what inertia and creep make of its weight.
+Errors of the joint angles are the same both ways, and cancel.
+"""
 _SLIDING_QUANTILE = 0.6
 """The dragged object lags behind when the hand turns round: the stronger pulls are those at which it slides."""
 _SPEED_SHARE = 0.5
@@ -44,8 +48,9 @@ class Hanging:
 
     @property
     def is_free(self) -> bool:
-        """Whether nothing but the fingers held it: the rest is what the noise makes of it."""
-        return self.weight_N > _LEAST_WEIGHT_N and self.held_back_N < 0.02 * self.weight_N + 2 * self.weight_sigma_N
+        """Whether nothing but the fingers held it."""
+        most_N = _HELD_BACK_N + _HELD_BACK_SHARE * self.weight_N
+        return self.weight_N > _LEAST_WEIGHT_N and self.held_back_N < most_N
 
 
 @dataclass(frozen=True)
