@@ -88,9 +88,10 @@ def experiment(
     from tactile_lab.cli.console import answer, emit_json, show_table, warn
     from tactile_lab.cli.experiment_progress import ExperimentProgress
     from tactile_lab.experiments.catalogue import experiment
+    from tactile_lab.experiments.groups import group_runs
     from tactile_lab.experiments.parquet import write_parquet
     from tactile_lab.experiments.reporting import document, part_of, write_report
-    from tactile_lab.experiments.summary import group_runs, short_table
+    from tactile_lab.experiments.summary import short_table
 
     study, processes = experiment(name), jobs or os.cpu_count() or 1
     cells = study.cells(_seeds(seeds), _limits(only or []), grasps)

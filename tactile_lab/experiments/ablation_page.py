@@ -13,6 +13,8 @@ from pathlib import Path
 
 from tactile_lab.evaluation.spread import Interval, quantile
 from tactile_lab.experiments.cells import Row
+from tactile_lab.experiments.figure_texts import UNKNOWN, paired
+from tactile_lab.experiments.groups import LEFT_OUT, NOTHING, Column, Group, group_runs
 from tactile_lab.experiments.runs.ablation_runs import (
     CARRIED,
     GRASPS,
@@ -24,7 +26,7 @@ from tactile_lab.experiments.runs.ablation_runs import (
     WITHOUT,
     WRONG,
 )
-from tactile_lab.experiments.summary import LEFT_OUT, NOTHING, UNKNOWN, Column, Group, group_runs, markdown, paired
+from tactile_lab.experiments.summary import markdown
 
 PAGE, MAP = Path("docs/results/ablation.md"), Path("docs/estimator.md")
 _HAUSDORFF = Column("Hausdorff", "hausdorff_mm", 2, kind="paired", most=20.0)

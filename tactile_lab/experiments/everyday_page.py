@@ -15,9 +15,10 @@ from typing import Any
 from drivers.core.atomic_files import write_whole
 from tactile_lab.experiments.cells import Row
 from tactile_lab.experiments.data.silhouettes import VIEWS, Lines
+from tactile_lab.experiments.figure_texts import UNKNOWN
 from tactile_lab.experiments.results.pages import WIDTH
 from tactile_lab.experiments.studies import everyday_sessions
-from tactile_lab.experiments.summary import UNKNOWN, markdown
+from tactile_lab.experiments.summary import markdown
 
 DOCS = Path("docs")
 PAGE, PICTURES = "everyday-objects.md", "pictures/everyday"

@@ -11,8 +11,8 @@ from typing import TypeAlias
 
 from drivers.core.errors import ConfigurationError
 from tactile_lab.experiments.cells import Cell, Row, Setting, Work, planned_cells
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.plot_data import Plot
-from tactile_lab.experiments.summary import Column
 
 REPORTED_SEEDS = tuple(range(1000, 1030))
 

@@ -16,12 +16,13 @@ from drivers.core.atomic_files import write_whole
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.execution.source_version import version
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Group, group_runs
 from tactile_lab.experiments.plots import draw
 from tactile_lab.experiments.results.pages import page
 from tactile_lab.experiments.results.stored_result import MadeBy, Part, StoredResult, Table
 from tactile_lab.experiments.runner import FORMAT
 from tactile_lab.experiments.studies.plots import UNITS
-from tactile_lab.experiments.summary import Group, group_json, group_runs, table
+from tactile_lab.experiments.summary import group_json, table
 
 JSON_FILE, TABLE_FILE, PLOT_FILE = "results.json", "results.md", "plot.svg"
 

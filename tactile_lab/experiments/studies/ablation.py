@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs import ablation_runs
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
-from tactile_lab.experiments.summary import Column
 
 ABLATION = Experiment(
     "ablation",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from drivers.simulation.objects import CATALOGUE
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs.carried_objects import MASS_kg, carry_object
 from tactile_lab.experiments.runs.weighed_objects import weigh_object
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.experiments.studies.solids import EVERYDAY_SCANS, scans_left_out
-from tactile_lab.experiments.summary import Column
 
 _OTHER_MASSES_kg = (0.05, 1.0, 2.0)
 _WEIGHED_MASSES_kg = (0.1, 0.2, 0.3, 0.4)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments.summary import Column
+from tactile_lab.experiments.groups import Column
 
 HAUSDORFF = Column("Hausdorff, mm", "hausdorff_mm")
 MEAN_DISTANCE = Column("mean distance, mm", "mean_mm", kind="median")

@@ -15,10 +15,10 @@ from tactile_lab.experiments.data.planar_data import PlanarGrasps
 from tactile_lab.experiments.data.sensing import SimulatedGrasps, with_finger_errors, without_paths
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, SURFACE_INSIDE
 from tactile_lab.experiments.studies.plots import ranges
-from tactile_lab.experiments.summary import Column
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon

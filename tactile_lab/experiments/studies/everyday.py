@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from tactile_lab.experiments.cells import Cell, Setting
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.studies import everyday_sessions
 from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE, REGISTRATION
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
 from tactile_lab.experiments.studies.solids import scans_left_out
-from tactile_lab.experiments.summary import Column
 
 
 def _settings(grasps: int) -> list[Setting]:

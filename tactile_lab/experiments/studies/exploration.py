@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs import exploration_runs, hand_exploration, kinematic_exploration
 from tactile_lab.experiments.studies.columns import HAUSDORFF, REGISTRATION
 from tactile_lab.experiments.studies.plots import ranges
-from tactile_lab.experiments.summary import Column
 
 EXPLORATION_COLUMNS = (
     Column("actions by B", "actions_B", 1, kind="estimate"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from calibration.fingertip.model import PARTS
 from tactile_lab.experiments.cells import grid
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs import (
     calibration_runs,
     camera_runs,
@@ -15,7 +16,6 @@ from tactile_lab.experiments.runs import (
 )
 from tactile_lab.experiments.runs.graph_stress import stock_solvers
 from tactile_lab.experiments.studies.plots import ranges
-from tactile_lab.experiments.summary import Column
 
 CAMERA_TRUTH = Experiment(
     "camera-truth",

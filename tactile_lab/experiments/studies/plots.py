@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from tactile_lab.evaluation.spread import quantile
 from tactile_lab.experiments.cells import Cell, Row, Value
 from tactile_lab.experiments.experiment import PlotOf
+from tactile_lab.experiments.groups import Group, group_runs
 from tactile_lab.experiments.plot_data import CurvePanel, Plot, Range, RangePanel, Series
-from tactile_lab.experiments.summary import Group, group_runs
 
 UNITS = {"noise": "%", "outliers": "%"}
 LOGARITHMIC = {"particles"}

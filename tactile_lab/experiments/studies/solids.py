@@ -7,6 +7,7 @@ from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.household import HOUSEHOLD
 from tactile_lab.experiments.data.solids import FURTHER_SHAPES, MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs import tracking_runs
 from tactile_lab.experiments.runs.limits import contact_limit, known_shape, solid_limit
 from tactile_lab.experiments.studies import everyday_shape
@@ -20,7 +21,6 @@ from tactile_lab.experiments.studies.columns import (
 )
 from tactile_lab.experiments.studies.planar import METHODS
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
-from tactile_lab.experiments.summary import Column
 
 FACETED_SOLIDS = ("box-12x6x6", "triangular-prism", "hexagonal-prism", "l-block")
 CURVED_SOLIDS = ("ellipsoid", "cylinder", "sphere", "mug", "bottle")

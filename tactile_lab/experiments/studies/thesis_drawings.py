@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 
 from tactile_lab.experiments.cells import Cell, Row, grid
 from tactile_lab.experiments.experiment import Experiment, PlotOf
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.plot_data import DrawingPanel, Plot, Stroke
 from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE, SURFACE_INSIDE
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
-from tactile_lab.experiments.summary import Column
 from tactile_lab.experiments.thesis import progress, shape_drawings, shape_models
 
 THREE_SHAPES = ("rectangle", "triangle", "ellipse")

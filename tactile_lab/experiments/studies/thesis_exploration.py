@@ -7,10 +7,10 @@ from typing import Any
 
 from tactile_lab.experiments.cells import Cell, Row, grid
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.plot_data import DrawingPanel, Plot, Stroke
 from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE
 from tactile_lab.experiments.studies.thesis_drawings import points_of
-from tactile_lab.experiments.summary import Column
 from tactile_lab.experiments.thesis import explored_cube, pose_actions
 from tactile_lab.experiments.thesis.facets import surfaces
 

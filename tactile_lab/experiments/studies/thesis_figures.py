@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tactile_lab.experiments.cells import Setting, grid
 from tactile_lab.experiments.experiment import Experiment
+from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs import shape_runs, tracking_runs
 from tactile_lab.experiments.studies.columns import (
     HAUSDORFF,
@@ -15,7 +16,6 @@ from tactile_lab.experiments.studies.columns import (
 )
 from tactile_lab.experiments.studies.planar import PLANAR_GRASPS
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, condition, curves, ranges
-from tactile_lab.experiments.summary import Column
 from tactile_lab.experiments.thesis import rig_sessions
 from tactile_lab.experiments.thesis.readings import READINGS, track_as_read
 

@@ -30,7 +30,7 @@ from tactile_lab.experiments.data.sensing import (
     SLIP_SIGMA_rad,
     planar_pose,
 )
-from tactile_lab.experiments.summary import REFERENCE_METHOD
+from tactile_lab.experiments.groups import REFERENCE_METHOD
 from tactile_lab.slam.tracking.contacts.motion import (
     MotionNoise,
     compose,

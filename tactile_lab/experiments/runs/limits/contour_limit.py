@@ -10,9 +10,9 @@ from drivers.core.contacts import Array
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.data import planar_data
 from tactile_lab.experiments.data.outlines import edge_normals
+from tactile_lab.experiments.groups import REFERENCE_METHOD
 from tactile_lab.experiments.run_metrics import contour_figures, registration_mm
 from tactile_lab.experiments.runs.limits.contact_limit import FlatSides, Limit, SeenSession, together
-from tactile_lab.experiments.summary import REFERENCE_METHOD
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_sides
 from tactile_lab.slam.shape.surfaces.surface import Contour
 

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from drivers.core.contacts import Array
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.data import spatial_data
+from tactile_lab.experiments.groups import REFERENCE_METHOD
 from tactile_lab.experiments.run_metrics import mesh_figures, registration_mm
 from tactile_lab.experiments.runs.limits.contact_limit import FlatSides, Limit, SeenSession, together
-from tactile_lab.experiments.summary import REFERENCE_METHOD
 from tactile_lab.slam.shape.surfaces.sampling import nearest_on_mesh
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 from tactile_lab.slam.tracking.faces.flat_faces import tangents

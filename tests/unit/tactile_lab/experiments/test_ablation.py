@@ -17,6 +17,8 @@ from tactile_lab.experiments.ablation_page import ablation_page, with_worth
 from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.data.left_in_place import simulate_thing
 from tactile_lab.experiments.data.planar_data import simulate
+from tactile_lab.experiments.figure_texts import paired
+from tactile_lab.experiments.groups import LEFT_OUT, NOTHING, Column, group_runs
 from tactile_lab.experiments.runs.ablation_runs import (
     LEFT,
     PLANE,
@@ -28,7 +30,6 @@ from tactile_lab.experiments.runs.ablation_runs import (
     settings,
     track_without,
 )
-from tactile_lab.experiments.summary import LEFT_OUT, NOTHING, Column, group_runs, paired
 from tactile_lab.experiments.touched_metrics import touched_figures
 from tactile_lab.slam.shape.fields.settings import GpisSettings, ShapePart
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam

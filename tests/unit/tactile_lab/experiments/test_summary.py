@@ -12,11 +12,12 @@ import pytest
 from tactile_lab.evaluation.spread import Spread, quantile
 from tactile_lab.experiments.catalogue import experiment
 from tactile_lab.experiments.cells import Cell, Row
+from tactile_lab.experiments.groups import Column, group_runs, varying_settings
 from tactile_lab.experiments.plot_data import CurvePanel, Plot, Series
 from tactile_lab.experiments.plots import draw
 from tactile_lab.experiments.reporting import document, part_of, write_report
 from tactile_lab.experiments.results.claims import numbers_in
-from tactile_lab.experiments.summary import Column, group_runs, markdown, reasons, short_table, table, varying_settings
+from tactile_lab.experiments.summary import markdown, reasons, short_table, table
 
 COLUMN = Column("Hausdorff, mm", "hausdorff_mm", 1, versus=True)
 

@@ -12,6 +12,8 @@ from tactile_lab.experiments.cells import Cell, Row
 from tactile_lab.experiments.coverage_criteria import CONTACT_m, ExploredMap, isolated_variance
 from tactile_lab.experiments.data.explored_objects import MovingObject, moved_alike
 from tactile_lab.experiments.data.planar_hand import PlanarHand, slip
+from tactile_lab.experiments.figure_texts import correlation
+from tactile_lab.experiments.groups import Column, Group
 from tactile_lab.experiments.runs.exploration_runs import (
     CLAIRVOYANT,
     INFORMED,
@@ -24,7 +26,7 @@ from tactile_lab.experiments.runs.exploration_runs import (
     palms_called,
 )
 from tactile_lab.experiments.runs.limits.oracle import fewest_grasps
-from tactile_lab.experiments.summary import Column, Group, correlation, table
+from tactile_lab.experiments.summary import table
 from tactile_lab.slam.exploration.ten_candidates import TEN_PALMS
 from tests.support.rectangle_world import contacts_every
 
