@@ -42,7 +42,9 @@ class ForkedChild(subprocess.Popen[bytes]):
             super()._execute_child(args, *others)  # type: ignore[misc]
             return
         import_module(module)
-        self.pid = os.fork()
+        with warnings.catch_warnings():  # from Python 3.12 on it warns where there are threads; none of them is copied
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self.pid = os.fork()
         if self.pid == 0:
             _become(module, env, stdin=pipes[0], stdout=pipes[3], stderr=pipes[5])
         self._child_created = True
