@@ -32,17 +32,18 @@ _NOISE = random.Random(1).randbytes(200_000)
 
 def text_cases() -> Iterator[Case]:
     """All of them."""
-    yield from _RIG.cases({**_yaml(), **_rigs()})
-    yield from _CALIBRATION.cases({name: _yaml()[name] for name in ("noise", "aliases of aliases", "33 000 keys")})
-    yield from _SETTINGS.cases({name: _yaml()[name] for name in ("15 MB", "merges of merges", "a Python object")})
+    yaml, texts = _yaml(), _json()
+    yield from _RIG.cases({**yaml, **_rigs()})
+    yield from _CALIBRATION.cases({name: yaml[name] for name in ("noise", "aliases of aliases", "33 000 keys")})
+    yield from _SETTINGS.cases({name: yaml[name] for name in ("15 MB", "merges of merges", "a Python object")})
     yield from _LENS.cases({"a matrix of a billion": _LENS_MATRIX, "noise behind the head": b"%YAML:1.0\n" + _NOISE})
     yield from _LENS.cases({"a pipe": os.mkfifo})
-    yield from _LOG.cases({**_json(), **_logs()})
+    yield from _LOG.cases({**texts, **_logs()})
     yield from _TIMED_TABLE.cases(_timed_tables())
-    yield from _TIMED_JSON.cases({name: _json()[name] for name in ("16 MB of brackets", "20 kB of brackets")})
+    yield from _TIMED_JSON.cases({name: texts[name] for name in ("16 MB of brackets", "20 kB of brackets")})
     yield from _PRESSES.cases(_presses())
     yield from _ELECTRODES.cases({"noise": _NOISE, "one line of 15 MB": "1 " * (15 * MB // 2), "words": "a b\n" * 20})
-    yield from _FOREARM.cases({name: _json()[name] for name in ("noise", "16 MB of brackets", "a number of 5 MB")})
+    yield from _FOREARM.cases({name: texts[name] for name in ("noise", "16 MB of brackets", "a number of 5 MB")})
     yield from _SENSOR.cases({name: _with_sensor(xml) for name, xml in _sensors().items()})
 
 
