@@ -57,15 +57,20 @@ def ask(kind: Ask, **details: Any) -> tuple[Request, ...]:
     return (Request(kind, **details),)
 
 
-def test_prompts_lead_through_every_grasp(tmp_path: Path) -> None:
-    run = Run(tmp_path, DiscWorld(disc()), SimulatedOperator())
-    assert run.outcome.ending is Ending.COMPLETE
-    stages = [panel.stage for panel in run.operator.panels]
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A session of two grasps in which nothing happens that was not meant to; only to be looked at."""
+    return Run(tmp_path_factory.mktemp("usual"), DiscWorld(disc()), SimulatedOperator())
+
+
+def test_prompts_lead_through_every_grasp(usual: Run) -> None:
+    assert usual.outcome.ending is Ending.COMPLETE
+    stages = [panel.stage for panel in usual.operator.panels]
     order = [stage for n, stage in enumerate(stages) if n == 0 or stage is not stages[n - 1]]
     one = [Stage.PLACE, Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE]
     assert order[:8] == [*one, Stage.ROTATE, Stage.RELEASE, Stage.PLACE]
-    assert all(panel.prompt for panel in run.operator.panels if panel.stage is not Stage.ESTIMATE)
-    prompts = list(dict.fromkeys(panel.prompt for panel in run.operator.panels if panel.grasp == 1))
+    assert all(panel.prompt for panel in usual.operator.panels if panel.stage is not Stage.ESTIMATE)
+    prompts = list(dict.fromkeys(panel.prompt for panel in usual.operator.panels if panel.grasp == 1))
     guided = [prompt for prompt in prompts if prompt][1:]  # the first is about placing the object
     assert [prompt.split(".")[0] for prompt in guided[:9]] == [
         "Move the hand around the object",
@@ -86,9 +91,8 @@ def test_what_a_request_does_not_say_is_no_step() -> None:
     assert (move.fingers, move.text) == ((), "")
 
 
-def test_guided_grasps_are_those_of_the_same_conductor(tmp_path: Path) -> None:
-    run = Run(tmp_path, DiscWorld(disc()), SimulatedOperator())
-    assert all(len(grasp.contacts) >= 4 for grasp in run.outcome.grasps)
+def test_guided_grasps_are_those_of_the_same_conductor(usual: Run) -> None:
+    assert all(len(grasp.contacts) >= 4 for grasp in usual.outcome.grasps)
     closed = [
         EventKind.TARE,
         EventKind.CLOSE_BEGIN,
@@ -96,17 +100,16 @@ def test_guided_grasps_are_those_of_the_same_conductor(tmp_path: Path) -> None:
         EventKind.CAPTURE_END,
         EventKind.TRUTH_FRAME,
     ]
-    assert run.world.session_events == [*closed, EventKind.HOLD_BEGIN, EventKind.HOLD_END, *closed]
+    assert usual.world.session_events == [*closed, EventKind.HOLD_BEGIN, EventKind.HOLD_END, *closed]
 
 
-def test_sensors_are_put_into_words(tmp_path: Path) -> None:
-    run = Run(tmp_path, DiscWorld(disc()), SimulatedOperator())
-    holding = [panel for panel in run.operator.panels if panel.stage is Stage.HOLD]
+def test_sensors_are_put_into_words(usual: Run) -> None:
+    holding = [panel for panel in usual.operator.panels if panel.stage is Stage.HOLD]
     assert holding[-1].view.is_steady
     assert "4 fingers touch" in holding[-1].view.words() or "5 fingers touch" in holding[-1].view.words()
-    assert any("captured 5 contacts" in text or "captured 4 contacts" in text for text in run.told)
-    assert any("% of the surface is known" in panel.unknown for panel in run.operator.panels)
-    assert all(panel.suggestion for panel in run.operator.panels)
+    assert any("captured 5 contacts" in text or "captured 4 contacts" in text for text in usual.told)
+    assert any("% of the surface is known" in panel.unknown for panel in usual.operator.panels)
+    assert all(panel.suggestion for panel in usual.operator.panels)
 
 
 def test_grasp_is_taken_back_and_the_estimate_with_it(tmp_path: Path) -> None:
