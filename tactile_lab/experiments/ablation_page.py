@@ -39,6 +39,7 @@ _SHOWN = (
 _TIMES = (("steps", "step_ms"), ("end", "finish_ms"))
 _NEGLIGIBLE = 0.005
 """Smaller mean differences are shown as zero, in the unit of the figure."""
+_NOTHING = "0"
 
 _INTRODUCTION = """# What each mechanism of the default method is worth
 
@@ -80,10 +81,10 @@ def ablation_page(rows: Sequence[Row], version: str) -> str:
 def worth(rows: Sequence[Row], name: str) -> str:
     """The loss in Hausdorff distance without a mechanism, in the plane, with wrong contacts and in space, mm.
 
-    Where these do not exercise it: in the condition that does, with its name.
+    Where these show nothing of it: in the condition that was made for it, with its name.
     """
     parts = [_loss(rows, name, condition) for condition in (PLANE, WRONG, SPACE)]
-    if set(parts) == {UNKNOWN}:
+    if {UNKNOWN, _NOTHING}.issuperset(parts):
         for condition in (THINGS, LEFT, LONG):
             if (part := _loss(rows, name, condition)) != UNKNOWN:
                 return f"{part} {condition}"
@@ -149,7 +150,7 @@ def _bold(interval: Interval | None, digits: int, *, with_interval: bool = True)
     if interval is None:
         return UNKNOWN
     if abs(interval.mean) < _NEGLIGIBLE:
-        return "0"
+        return _NOTHING
     text = interval.text(digits) if with_interval else f"{interval.mean:+.{digits}f}"
     return f"**{text}**" if interval.excludes_zero(_NEGLIGIBLE) else text
 
