@@ -103,7 +103,7 @@ class FacetedScorer:
 
     def regular(self, best: Hypothesis) -> Hypothesis:
         """A faceted hypothesis with faces and poses as regular as contacts and motion allow, if more likely."""
-        if not self._is_sharp(best):
+        if not self.is_sharp(best):
             return best
         try:
             faces, _ = flat_faces(best.map)
@@ -117,6 +117,11 @@ class FacetedScorer:
         found = smoother.fit(at.rows, faces, _SETTLING_STEPS)
         return _likelier(best, self._sharp(best.map.with_rows(found.rows)))
 
+    def is_sharp(self, best: Hypothesis) -> bool:
+        """Whether flat faces explain a hypothesis best."""
+        sharp = self._sharp(best.map)
+        return sharp is not None and sharp.cost <= best.cost + _SAME_nats
+
     def smooth(self, contact_map: ContactMap) -> Hypothesis:
         """As :meth:`better`, after the poses were smoothed with the field, and contacts left out that do not fit it."""
         return self.better(self._scorer.smooth(contact_map, _FIELD_STEPS).map)
@@ -125,11 +130,6 @@ class FacetedScorer:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""
         faceted = smoothed_with_faces(contact_map, self._noise) if self._mechanisms.has("faces") else None
         return self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
-
-    def _is_sharp(self, best: Hypothesis) -> bool:
-        """Whether flat faces explain a hypothesis best."""
-        sharp = self._sharp(best.map)
-        return sharp is not None and sharp.cost <= best.cost + _SAME_nats
 
     def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:
         """The unchanged map, its contacts explained by a sharp shape; None if there is none."""
