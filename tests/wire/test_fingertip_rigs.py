@@ -76,6 +76,7 @@ def found(rig: Path) -> dict[str, Finding]:
     return {finding.device.removeprefix("fingertip "): finding for finding in check_rig(str(rig))}
 
 
+@pytest.mark.usefixtures("patient")
 def test_every_sensor_is_found_and_described(rig: Path) -> None:
     with emulate_sensors(load_fingertip_rig(rig)) as places:
         findings = found(rig)
@@ -205,6 +206,7 @@ def test_a_session_needs_a_hand(rig: Path) -> None:
         load_rig(str(rig))
 
 
+@pytest.mark.usefixtures("patient")
 def test_the_command_tells_what_is_wrong_and_ends_with_its_code(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from tactile_lab.cli.main import main
 
