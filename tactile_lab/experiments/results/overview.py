@@ -9,12 +9,14 @@ from textwrap import fill
 from drivers.core.configuration import load_model
 from tactile_lab.experiments.plots import draw
 from tactile_lab.experiments.results.claims import MET, Claim, Claims, Goal, judge_goal, plot
-from tactile_lab.experiments.results.pages import WIDTH
 from tactile_lab.experiments.results.stored_result import StoredResult
 from tactile_lab.experiments.results.storing import PICTURES, RESULTS
 from tactile_lab.experiments.summary import markdown
 
 OVERVIEW, CLAIMS = "results.md", "claims.yaml"
+_FIGURE = "figure-"
+_WIDTH = 190
+"""Of a line of text: the whole page is to have at most 200 lines."""
 
 
 def overview(docs: Path, results: Mapping[str, StoredResult]) -> dict[str, str]:
@@ -54,9 +56,9 @@ def _limit(goal: Goal) -> str:
 
 
 def _section(claim: Claim, results: Mapping[str, StoredResult]) -> str:
-    links = ", ".join(f"[{name}]({RESULTS}/{name}.md)" for name in claim.pages)
+    links = ", ".join(_link(name, name) for name in claim.pages)
     text = f"{_balance(claim, results)} {claim.text.strip()} More: {links}."
-    return f"## {claim.title}\n\n{_fill(text)}\n\n![{claim.title}]({_picture(claim)})"
+    return f"## {claim.title}\n\n{_fill(text)}\n![{claim.title}]({_picture(claim)})"
 
 
 def _balance(claim: Claim, results: Mapping[str, StoredResult]) -> str:
@@ -71,9 +73,16 @@ def _balance(claim: Claim, results: Mapping[str, StoredResult]) -> str:
 def _index(claims: Claims, results: Mapping[str, StoredResult]) -> str:
     """Links to the pages that no claim leads to."""
     linked = {name for claim in claims.claims for name in claim.pages}
-    others = [f"[{name}]({RESULTS}/{name}.md)" for name in results if name not in linked]
-    return _fill(f"More pages: {', '.join(others)}.") if others else ""
+    others = [name for name in results if name not in linked]
+    figures = [_link(name, name.removeprefix(_FIGURE)) for name in others if name.startswith(_FIGURE)]
+    rest = [_link(name, name) for name in others if not name.startswith(_FIGURE)]
+    sentences = (("Figures of the thesis", figures), ("More pages", rest))
+    return _fill(" ".join(f"{begin}: {', '.join(links)}." for begin, links in sentences if links))
+
+
+def _link(name: str, words: str) -> str:
+    return f"[{words}]({RESULTS}/{name}.md)"
 
 
 def _fill(text: str) -> str:
-    return fill(text, WIDTH, break_long_words=False, break_on_hyphens=False)
+    return fill(text, _WIDTH, break_long_words=False, break_on_hyphens=False)
