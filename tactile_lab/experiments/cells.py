@@ -65,7 +65,7 @@ class Row:
         if self.figures is None:
             return self.problem
         if (status := self.figures.get("status", "ok")) not in FOLLOWED:
-            return f"object {status}"
+            return status if status.startswith("object ") else f"object {status}"
         registration = self.figures.get("registration_mm")
         if registration is not None and registration > FAILURE_LIMIT_MM:
             return f"registration above {FAILURE_LIMIT_MM:g} mm"

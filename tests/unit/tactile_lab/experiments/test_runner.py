@@ -93,6 +93,7 @@ def test_a_run_fails_by_registration_status_or_without_a_shape() -> None:
     assert failure(registration_mm=5.1, hausdorff_mm=1.0) == "registration above 5 mm"
     assert failure(registration_mm=1.0, hausdorff_mm=None) == "no shape"
     assert failure(registration_mm=1.0, hausdorff_mm=1.0, status="lost") == "object lost"
+    assert failure(registration_mm=1.0, hausdorff_mm=1.0, status="object lost") == "object lost"  # as sweeps say it
 
 
 def test_results_of_another_version_are_only_kept_when_asked_for(
