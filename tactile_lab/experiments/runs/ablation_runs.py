@@ -18,7 +18,7 @@ from gtsam import Pose3, Rot3
 from tactile_lab.experiments.cells import Cell, Row, Setting, grid
 from tactile_lab.experiments.data import left_in_place, planar_data, spatial_data
 from tactile_lab.experiments.data.carried_off import carried_off
-from tactile_lab.experiments.data.sensing import SimulatedGrasps
+from tactile_lab.experiments.data.sensing import FINGER_SIGMA_m, SimulatedGrasps, with_finger_errors
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.experiments.touched_metrics import touched_figures
@@ -29,7 +29,7 @@ _Result = TypeVar("_Result")
 
 NOTHING = "nothing"
 PLANE, WRONG, CARRIED, LONG, SPACE = "in the plane", "wrong contacts", "carried off", "long session", "in space"
-LEFT, THINGS = "left in place", "everyday things"
+LEFT, THINGS, BIASED = "left in place", "everyday things", "biased fingers"
 SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         PLANE: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
@@ -38,14 +38,17 @@ SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         LEFT: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         LONG: ("L", "ellipse"),
         SPACE: ("box-12x6x6", "triangular-prism", "ellipsoid", "cylinder", "hexagonal-prism", "l-block"),
+        BIASED: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
         THINGS: ("cup", "cup-with-handle", "tin", "wedge", "hammer", "t-block"),
     }
 )
 GRASPS: Mapping[str, int] = MappingProxyType(
-    {PLANE: 12, WRONG: 12, CARRIED: 12, LEFT: 12, LONG: 60, SPACE: 12, THINGS: 12}
+    {PLANE: 12, WRONG: 12, CARRIED: 12, LEFT: 12, LONG: 60, SPACE: 12, THINGS: 12, BIASED: 12}
 )
 CARRIED_BEFORE, FARTHEST_m = 8, 0.15
 """Grasp before which somebody puts the object elsewhere, and by how much at most per axis; it is also turned."""
+_OF_FINGERS = 71
+"""Of the errors that fingers have under biased fingers, apart from the random numbers of the contacts."""
 UNHELD = 0.15
 """Share of the motion's noise that applies to an object that was left in place, as rig ``sim`` has it."""
 CHECK_EVERY = 5
@@ -78,6 +81,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "without one": _joint("without one"),
         "placing on the object": _joint("placing on the object"),
         "regular faces": _joint("regular faces"),
+        "finger errors": _joint("finger errors"),
         "right angles": _shape("right angles"),
         "face extents": _shape("face extents"),
         "corners": _shape("corners"),
@@ -111,12 +115,13 @@ _IN_SPACE_ONLY = (
 )
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
-_LEFT_ONLY = ("pushes", "surprises")
+_NOWHERE_ELSE = ("pushes", "surprises", "finger errors")
 _FEW: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         LONG: (NOTHING, "fixed lag"),
         CARRIED: (NOTHING, "relocation", "deferred association", "backward reading"),
         LEFT: (NOTHING, "pushes", "deferred association"),
+        BIASED: (NOTHING, "finger errors"),
         THINGS: (
             NOTHING,
             "pushes",
@@ -143,6 +148,7 @@ _TELLING: Mapping[str, frozenset[str]] = MappingProxyType(
             "relocation": ("deferred association",),
             "pushes": ("deferred association",),
             "surprises": (),
+            "finger errors": (),
             "deferred association": (),
             "doubts": (),
             "without one": (),
@@ -178,7 +184,7 @@ def settings(grasps: int) -> list[Setting]:
 def _left_out_in(condition: str) -> list[str]:
     if condition in _FEW:
         return list(_FEW[condition])
-    impossible = (*_LONG_ONLY, *_LEFT_ONLY, *(_IN_PLANE_ONLY if condition == SPACE else _IN_SPACE_ONLY))
+    impossible = (*_LONG_ONLY, *_NOWHERE_ELSE, *(_IN_PLANE_ONLY if condition == SPACE else _IN_SPACE_ONLY))
     return [name for name in WITHOUT if name not in impossible]
 
 
@@ -216,6 +222,8 @@ def _data(condition: str, shape: str, grasps: int, seed: int) -> SimulatedGrasps
     if condition == THINGS:
         return left_in_place.simulate_thing(shape, seed, count=grasps)
     data = planar_data.simulate(shape, seed, count=grasps, outlier_share=0.1 if condition == WRONG else 0.0)
+    if condition == BIASED:
+        return with_finger_errors(data, FINGER_SIGMA_m, np.random.default_rng([seed, _OF_FINGERS]))
     return carried_off(data, CARRIED_BEFORE, _jump(seed)) if condition == CARRIED else data
 
 

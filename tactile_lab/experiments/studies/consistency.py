@@ -12,7 +12,7 @@ from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data import planar_data, second_family, spatial_data
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
-from tactile_lab.experiments.data.sensing import SimulatedGrasps, with_finger_errors, without_paths
+from tactile_lab.experiments.data.sensing import FINGER_SIGMA_m, SimulatedGrasps, with_finger_errors, without_paths
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
@@ -29,8 +29,6 @@ FIRST, SECOND, FINGERS = "first", "second", "fingers"
 """The families of simulated contacts: :mod:`planar_data` and :mod:`spatial_data`; :mod:`second_family`; and the first
 with an error that each finger has throughout a session, as the simulated rig's have.
 """
-FINGER_SIGMA_m = 0.0008
-"""Joint sensors with a bias of 0.6 degrees each."""
 
 PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")
 SOLIDS = ("box-12x6x6", "l-block", "cylinder", "ellipsoid")

@@ -10,6 +10,7 @@ whole, until the object is better known.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -219,18 +220,22 @@ class JointTracker:
             self._share_best_kernel()
         faceted = opinions.with_faces([opinions.place_deferred(one) for one in self._hypotheses])
         self._rivals = opinions.rivals
-        if self._tells_errors(faceted[0]):
-            faceted[0] = replace(faceted[0], map=with_errors_resolved(faceted[0].map, self._noise))
+        faceted[0] = self._resolve_errors(faceted[0])
         found = PoseCovariances.of(faceted[0].map, self._noise)
         faceted[0] = replace(faceted[0], map=with_covariances(faceted[0].map, found.birth))
         self._common_covariances = found.common
         self._hypotheses = [replace(one, map=unfold(one.map)) for one in faceted]
         self._has_ended = True
 
-    def _tells_errors(self, best: Hypothesis) -> bool:
-        """Whether contacts say how their finger's errors move them, and flat faces, which tell these, explain them."""
-        given = best.map.contacts_world.shared.can_be_estimated
-        return given and FacetedScorer(self._scorer, self._noise, self.mechanisms).is_sharp(best)
+    def _resolve_errors(self, best: Hypothesis) -> Hypothesis:
+        """The hypothesis without the errors of fingers, if its contacts say how these move them, and flat faces, which
+        tell these, explain them.
+        """
+        told = best.map.contacts_world.shared.can_be_estimated
+        if not told or not FacetedScorer(self._scorer, self._noise, self.mechanisms).is_sharp(best):
+            return best
+        resolve = partial(with_errors_resolved, noise=self._noise)
+        return replace(best, map=self.mechanisms.improve("finger errors", best.map, resolve))
 
     def _push(self, best: Hypothesis) -> list[Hypothesis]:
         return propose_pushes(best, self._noise, self._settings.proposals, self._scorer)

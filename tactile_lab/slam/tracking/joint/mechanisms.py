@@ -21,6 +21,7 @@ Mechanism: TypeAlias = Literal[
     "without one",
     "placing on the object",
     "regular faces",
+    "finger errors",
     "pose uncertainty",
 ]
 """Backward reading, the beam and the fixed lag have settings of their own, shape models theirs."""
