@@ -20,8 +20,10 @@ NORMAL_SIGMA_rad = float(np.deg2rad(5.0))
 SLIP_SIGMA_m = 0.010
 SLIP_SIGMA_rad = float(np.deg2rad(20.0))
 OUTLIER_SIGMA_m = 0.010
-FINGER_SIGMA_m = 0.0008
-"""Of a finger's own error, if it has one: joint sensors with a bias of 0.6 degrees each."""
+_FINGER_SIGMA_m, _OF_FINGERS = 0.0008, 71
+"""Of a finger's own error, if it has one: joint sensors with a bias of 0.6 degrees each. And what keeps these errors
+apart from the random numbers of the contacts.
+"""
 FORCE_N = 0.7
 
 IN_PLANE = np.array([1.0, 1.0, 0.0])
@@ -49,6 +51,11 @@ _Data = TypeVar("_Data", bound=SimulatedGrasps)
 def without_paths(data: _Data) -> _Data:
     """The same session, the fingers' approach paths unknown."""
     return replace(data, grasps=tuple(replace(grasp, approach_paths=()) for grasp in data.grasps))
+
+
+def by_biased_fingers(data: _Data, seed: int) -> _Data:
+    """The same session by a hand whose joint sensors are biased as the simulated rig's are."""
+    return with_finger_errors(data, _FINGER_SIGMA_m, np.random.default_rng([seed, _OF_FINGERS]))
 
 
 def with_finger_errors(data: _Data, sigma_m: float, rng: np.random.Generator) -> _Data:

@@ -18,7 +18,7 @@ from gtsam import Pose3, Rot3
 from tactile_lab.experiments.cells import Cell, Row, Setting, grid
 from tactile_lab.experiments.data import left_in_place, planar_data, spatial_data
 from tactile_lab.experiments.data.carried_off import carried_off
-from tactile_lab.experiments.data.sensing import FINGER_SIGMA_m, SimulatedGrasps, with_finger_errors
+from tactile_lab.experiments.data.sensing import SimulatedGrasps, by_biased_fingers
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.experiments.touched_metrics import touched_figures
@@ -30,15 +30,16 @@ _Result = TypeVar("_Result")
 NOTHING = "nothing"
 PLANE, WRONG, CARRIED, LONG, SPACE = "in the plane", "wrong contacts", "carried off", "long session", "in space"
 LEFT, THINGS, BIASED = "left in place", "everyday things", "biased fingers"
+_OUTLINES = ("L", "triangle", "rectangle", "ellipse", "hexagon")
 SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        PLANE: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
-        WRONG: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
-        CARRIED: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
-        LEFT: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
+        PLANE: _OUTLINES,
+        WRONG: _OUTLINES,
+        CARRIED: _OUTLINES,
+        LEFT: _OUTLINES,
         LONG: ("L", "ellipse"),
         SPACE: ("box-12x6x6", "triangular-prism", "ellipsoid", "cylinder", "hexagonal-prism", "l-block"),
-        BIASED: ("L", "triangle", "rectangle", "ellipse", "hexagon"),
+        BIASED: _OUTLINES,
         THINGS: ("cup", "cup-with-handle", "tin", "wedge", "hammer", "t-block"),
     }
 )
@@ -47,8 +48,6 @@ GRASPS: Mapping[str, int] = MappingProxyType(
 )
 CARRIED_BEFORE, FARTHEST_m = 8, 0.15
 """Grasp before which somebody puts the object elsewhere, and by how much at most per axis; it is also turned."""
-_OF_FINGERS = 71
-"""Of the errors that fingers have under biased fingers, apart from the random numbers of the contacts."""
 UNHELD = 0.15
 """Share of the motion's noise that applies to an object that was left in place, as rig ``sim`` has it."""
 CHECK_EVERY = 5
@@ -102,7 +101,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
 )
 """Settings that switch a mechanism off, by its name."""
 
-_IN_SPACE_ONLY = (
+_BRANCHES_IN_SPACE = (
     "polyhedron",
     "prism",
     "turned",
@@ -111,8 +110,8 @@ _IN_SPACE_ONLY = (
     "parts",
     "strays",
     "held-out contacts",
-    "pose uncertainty",
 )
+_IN_SPACE_ONLY = (*_BRANCHES_IN_SPACE, "pose uncertainty")
 _IN_PLANE_ONLY = ("corners", "without one")
 _LONG_ONLY = ("fixed lag",)
 _NOWHERE_ELSE = ("pushes", "surprises", "finger errors")
@@ -122,21 +121,7 @@ _FEW: Mapping[str, tuple[str, ...]] = MappingProxyType(
         CARRIED: (NOTHING, "relocation", "deferred association", "backward reading"),
         LEFT: (NOTHING, "pushes", "deferred association"),
         BIASED: (NOTHING, "finger errors"),
-        THINGS: (
-            NOTHING,
-            "pushes",
-            "surprises",
-            "contradictions",
-            "held-out contacts",
-            "field",
-            "polyhedron",
-            "prism",
-            "turned",
-            "standing field",
-            "sections",
-            "parts",
-            "strays",
-        ),
+        THINGS: (NOTHING, "pushes", "surprises", "contradictions", "field", *_BRANCHES_IN_SPACE),
     }
 )
 """What is left out in conditions that were made for some mechanisms."""
@@ -223,7 +208,7 @@ def _data(condition: str, shape: str, grasps: int, seed: int) -> SimulatedGrasps
         return left_in_place.simulate_thing(shape, seed, count=grasps)
     data = planar_data.simulate(shape, seed, count=grasps, outlier_share=0.1 if condition == WRONG else 0.0)
     if condition == BIASED:
-        return with_finger_errors(data, FINGER_SIGMA_m, np.random.default_rng([seed, _OF_FINGERS]))
+        return by_biased_fingers(data, seed)
     return carried_off(data, CARRIED_BEFORE, _jump(seed)) if condition == CARRIED else data
 
 

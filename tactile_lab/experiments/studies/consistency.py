@@ -12,7 +12,7 @@ from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data import planar_data, second_family, spatial_data
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
-from tactile_lab.experiments.data.sensing import FINGER_SIGMA_m, SimulatedGrasps, with_finger_errors, without_paths
+from tactile_lab.experiments.data.sensing import SimulatedGrasps, by_biased_fingers, without_paths
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
@@ -33,8 +33,6 @@ with an error that each finger has throughout a session, as the simulated rig's 
 PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")
 SOLIDS = ("box-12x6x6", "l-block", "cylinder", "ellipsoid")
 _MORE_GRASPS_IN_SPACE = 1.5
-_OF_FINGERS = 71
-"""Apart from the random numbers of the contacts."""
 _FAR_SIGMAS, _FAR_SHARE = 5.0, 0.01
 """A shape is off if more than this share of it is farther from the truth than so many stated standard deviations."""
 
@@ -94,7 +92,7 @@ def _data(cell: Cell) -> PlanarGrasps | SpatialGrasps:
     simulate = planar_data.simulate if flat else spatial_data.simulate
     data: PlanarGrasps | SpatialGrasps = simulate(cell["shape"], cell.seed, count=count, outlier_share=wrong)
     if cell["family"] == FINGERS:
-        data = with_finger_errors(data, FINGER_SIGMA_m, np.random.default_rng([cell.seed, _OF_FINGERS]))
+        data = by_biased_fingers(data, cell.seed)
     return without_paths(data) if wrong else data
 
 
