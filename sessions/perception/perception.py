@@ -20,6 +20,7 @@ from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
 from drivers.core.errors import DeviceError, SessionDataError
 from drivers.core.fingertip import FingertipSensor
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
+from drivers.shadow.model.motors import MotorMap
 from sessions.perception.approach_paths import TipSurface, approach_paths
 from sessions.perception.carrying.carry import Carry
 from sessions.perception.carrying.held_object import HeldObject
@@ -28,7 +29,14 @@ from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.perception.hand_odometry import HandOdometry
 from sessions.perception.hand_placement import HandPlacement
-from sessions.perception.instruments import BaseReading, FrameReading, HandReading, SlotFingertip, WrenchFingertip
+from sessions.perception.instruments import (
+    BaseReading,
+    FrameReading,
+    HandReading,
+    SlotFingertip,
+    WrenchFingertip,
+    motor_torques,
+)
 from sessions.perception.touch_capture import Capture, Measured, Probed, TouchSelection
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
@@ -63,6 +71,7 @@ class Perception:
         mount_covariance: its covariance, see :class:`MountUncertainty`; None if unknown.
         tip_surfaces: of the fingertips whose approach paths are computed, by finger.
         form: of the hand.
+        motors: which motor pulls which joint; without it links that push stay unnoticed.
     """
 
     def __init__(
@@ -76,6 +85,7 @@ class Perception:
         tip_surfaces: Mapping[str, TipSurface] | None = None,
         settings: PerceptionSettings | None = None,
         form: HandForm = RIGHT_HAND,
+        motors: MotorMap | None = None,
     ) -> None:
         self.form = form
         """Which hand it is."""
@@ -99,7 +109,7 @@ class Perception:
         self._probed = Probed()
         self._carried = HandOdometry()
         felt = self.fingertips if self.settings.odometry == "touch" else {}
-        self.held = HeldObject(felt, form.side, self.settings.odometry_scale)
+        self.held = HeldObject(felt, form.side, self.settings.odometry_scale, motors)
         """The object since it was grasped."""
         self._scales = Scales(self.held, form.side, self.settings.joint_sigma_rad)
 
@@ -117,7 +127,8 @@ class Perception:
         if self._capture is not None:
             self._capture.joints_rad.append(joints_rad)
         if self.held.is_watched and self._placement.ready:
-            self.held.on_hand(sample.stamp_ns, joints_rad, self._placement.world_T_forearm)
+            world_T_forearm = self._placement.world_T_forearm
+            self.held.on_hand(sample.stamp_ns, joints_rad, world_T_forearm, motor_torques(sample))
 
     def on_base(self, sample: BaseReading) -> None:
         """Take the positioner's joints."""

@@ -54,6 +54,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         everyday.EVERYDAY_OBJECTS,
         everyday.HANDS,
         carrying.CARRIES,
+        carrying.CARRIED_3D,
         carrying.WEIGHING,
         laboratory.CAMERA_TRUTH,
         laboratory.GRAPH_STRESS,

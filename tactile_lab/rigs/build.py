@@ -137,6 +137,7 @@ def build_interpreter(rig: Rig) -> Interpreter:
         tip_surfaces={finger: _tip_surface(kind, tip) for finger, tip in tips.items()},
         settings=description.perception,
         form=form,
+        motors=MotorMap.load(rig.files["motors"]),
     )
     return Interpreter(
         perception,

@@ -14,6 +14,7 @@ from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
 from sessions.perception.carrying.planar_motions import displacement, planar_matrices
+from sessions.perception.carrying.roundness import Roundness
 from sessions.perception.carrying.tilt import tilt_rad
 from sessions.perception.carrying.tip_steps import TipSteps, tip_steps
 
@@ -34,31 +35,39 @@ _NO_HOLD_s = 0.05
 
 @dataclass(frozen=True)
 class CarryNoise:
-    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decision 55).
+    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83).
 
     Attributes:
         least_m, least_rad: of any carry.
-        spread: share of the differences between the answers of other assumptions about friction.
+        spread_m, spread_rad: share of the differences between the answers of other assumptions about friction.
         slip_m, slip_rad: share of the slip itself.
+        round_rad: share of the hand's turn that a round object may be off by, for each fingertip beyond two.
+        roll_m: how far a round object with sides that lean rolls when it is let go and grasped, over the sine.
         let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
         closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
+        links_m_s, links_rad_s: for each second in which links pushed meanwhile.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
 
-    least_m: float = 0.00015
-    least_rad: float = float(np.deg2rad(0.085))
-    spread: float = 0.75
+    least_m: float = 0.00008
+    least_rad: float = float(np.deg2rad(0.04))
+    spread_m: float = 1.2
+    spread_rad: float = 0.2
     slip_m: float = 0.02
-    slip_rad: float = 0.028
-    let_go_m_N: float = 0.0001
-    let_go_rad_N: float = float(np.deg2rad(0.12))
-    pushed_m_N: float = 0.00175
-    pushed_rad_N: float = float(np.deg2rad(1.0))
-    closed_m_N: float = 0.006
-    closed_rad_N: float = float(np.deg2rad(2.0))
+    slip_rad: float = 0.037
+    round_rad: float = 0.083
+    roll_m: float = 0.0045
+    let_go_m_N: float = 0.00006
+    let_go_rad_N: float = float(np.deg2rad(0.07))
+    pushed_m_N: float = 0.001
+    pushed_rad_N: float = float(np.deg2rad(0.5))
+    closed_m_N: float = 0.003
+    closed_rad_N: float = float(np.deg2rad(1.9))
+    links_m_s: float = 0.0026
+    links_rad_s: float = float(np.deg2rad(3.0))
     unseen: float = 0.5
 
 
@@ -144,16 +153,19 @@ class CarryOdometry:
         half_width_m = float(np.clip(half_m, _LEAST_HALF_WIDTH_m, _LARGEST_HALF_WIDTH_m))
         return self.measured.known(Friction(half_width_m=half_width_m))
 
-    def closed(self, sigma: StepSigma, closing_N: float) -> StepSigma:
+    def closed(self, sigma: StepSigma, closing_N: float, pushed_s: float = 0.0) -> StepSigma:
         """How well the object's place is known once the hand has closed again.
 
         Args:
             sigma: before.
             closing_N: largest net force of the fingertips meanwhile.
+            pushed_s: how long links pushed.
         """
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
-        translation_m = np.hypot(sigma.translation_m, self._scale * noise.closed_m_N * excess_N)
-        rotation_rad = np.hypot(sigma.rotation_rad, self._scale * noise.closed_rad_N * excess_N)
+        parts_m = np.array([noise.closed_m_N * excess_N, noise.links_m_s * pushed_s])
+        parts_rad = np.array([noise.closed_rad_N * excess_N, noise.links_rad_s * pushed_s])
+        translation_m = np.linalg.norm([sigma.translation_m, *self._scale * parts_m])
+        rotation_rad = np.linalg.norm([sigma.rotation_rad, *self._scale * parts_rad])
         return StepSigma(float(translation_m), float(rotation_rad))
 
     def estimate(self, samples: CarrySamples) -> Carry:
@@ -175,7 +187,9 @@ class CarryOdometry:
         void_s = steps.step_s @ (steps.is_void & [finger in self._fingertips for finger in FINGERS])
         return Carry(
             motion=_pose(motions[0]),
-            sigma=self._sigma(ends.std(axis=0), slip, steps, self._unseen(steps, balance.centres_m, tilted_rad)),
+            sigma=self._sigma(
+                ends.std(axis=0), slip, steps, balance, self._unseen(steps, balance.centres_m, tilted_rad)
+            ),
             slip_m=float(np.hypot(*slip[:2])),
             slip_rad=float(abs(slip[2])),
             loose_s=loose_s,
@@ -192,15 +206,22 @@ class CarryOdometry:
             [2 * self.friction.half_width_m, 1.0]
         )
 
-    def _sigma(self, spread: Array, slip: Array, steps: TipSteps, unseen: Array) -> StepSigma:
-        noise = self.noise
+    def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
+        noise, held = self.noise, Roundness.of(steps, balance)
         far_m, far_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2]
-        while_held_m = noise.least_m + noise.spread * far_m + noise.slip_m * np.hypot(*slip[:2])
-        while_held_rad = noise.least_rad + noise.spread * far_rad + noise.slip_rad * abs(slip[2])
+        while_held_m = noise.least_m + noise.spread_m * far_m + noise.slip_m * np.hypot(*slip[:2])
+        while_held_rad = noise.least_rad + noise.spread_rad * far_rad + noise.slip_rad * abs(slip[2])
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
-        parts_m = [while_held_m, noise.let_go_m_N * pressed_N, noise.pushed_m_N * pushed_N, noise.unseen * unseen[0]]
+        parts_m = [
+            while_held_m,
+            noise.roll_m * held.loose * held.lean,
+            noise.let_go_m_N * pressed_N,
+            noise.pushed_m_N * pushed_N,
+            noise.unseen * unseen[0],
+        ]
         parts_rad = [
             while_held_rad,
+            noise.round_rad * held.loose / held.spare * float(_turns_rad(steps).sum()),
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],
@@ -257,8 +278,13 @@ def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, Continuo
     doubt = np.maximum(poorly, _resistance(steps))
     moves = planar_matrices(steps.world_T_palm)
     shifts = np.einsum("nij,nj->ni", moves[:, :2, :2], centres_m) + moves[:, :2, 2] - centres_m
-    turns = np.abs(np.arctan2(moves[:, 1, 0], moves[:, 0, 0]))
-    return np.array([np.linalg.norm(shifts, axis=1) @ doubt, turns @ doubt])
+    return np.array([np.linalg.norm(shifts, axis=1) @ doubt, _turns_rad(steps) @ doubt])
+
+
+def _turns_rad(steps: TipSteps) -> Array:
+    """How far the hand turned in each step, shape (n,)."""
+    moves = planar_matrices(steps.world_T_palm)
+    return np.abs(np.arctan2(moves[:, 1, 0], moves[:, 0, 0]))
 
 
 def _pose(motion: Array) -> Pose2:

@@ -8,9 +8,11 @@ import numpy as np
 
 from drivers.core.contacts import Array, StepSigma
 from drivers.core.fingertip import ContinuousFingertip, FingertipSensor
+from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry import Carry, CarryOdometry
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
+from sessions.perception.carrying.link_pushes import LinkPushes
 from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.touch_capture import Measured
 
@@ -25,15 +27,25 @@ class HeldObject:
         fingertips: of the rig, by finger; none for no odometry.
         side: of the hand.
         scale: factor of the stated standard deviations.
+        motors: which motor pulls which joint; None if that is not known.
     """
 
-    def __init__(self, fingertips: Mapping[str, FingertipSensor], side: Side, scale: float = 1.0) -> None:
+    def __init__(
+        self,
+        fingertips: Mapping[str, FingertipSensor],
+        side: Side,
+        scale: float = 1.0,
+        motors: MotorMap | None = None,
+    ) -> None:
         self.fingertips = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
         self._record = CarryRecord(self.fingertips)
         self.odometry = CarryOdometry(self.fingertips, side, scale)
         """Estimates the carries."""
 
         self._from_ns, self._side = 0, side
+        self._links = None if motors is None else LinkPushes(motors, self.fingertips, side)
+        self.pushed_s = 0.0
+        """How long links pushed while the hand closed for the last capture."""
         self.closing_N = 0.0
         """Largest net force of the fingertips along the table while the hand closed for the last capture.
 
@@ -52,9 +64,11 @@ class HeldObject:
         """Whether an object is grasped, and :meth:`on_hand` is wanted."""
         return self._record.is_open
 
-    def on_hand(self, stamp_ns: int, joints_rad: Array, world_T_forearm: Array) -> None:
-        """Joint angles, shape (24,), and the forearm's pose, shape (4, 4)."""
-        self._record.take(stamp_ns, joints_rad, world_T_forearm)
+    def on_hand(
+        self, stamp_ns: int, joints_rad: Array, world_T_forearm: Array, motor_counts: Array | None = None
+    ) -> None:
+        """Joint angles, shape (24,), the forearm's pose, shape (4, 4), and the motors' strain gauges, shape (20,)."""
+        self._record.take(stamp_ns, joints_rad, world_T_forearm, motor_counts)
 
     def on_close(self, stamp_ns: int) -> None:
         """The fingers begin to close; the object may be pushed."""
@@ -65,6 +79,7 @@ class HeldObject:
         """The fingers have closed and rest: whatever moves the object from now on counts."""
         closing = self._record.since(self._from_ns) if self._record.is_open else None
         self.closing_N = 0.0 if closing is None else largest_net_N(closing, self.fingertips, self._side)
+        self.pushed_s = 0.0 if closing is None or self._links is None else self._links.pushed_s(closing)
         self._from_ns = stamp_ns
         self._record.begin()
 
@@ -96,7 +111,7 @@ class HeldObject:
 
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
-        return None if sigma is None else self.odometry.closed(sigma, self.closing_N)
+        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, self.pushed_s)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
         """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""

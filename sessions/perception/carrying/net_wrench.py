@@ -75,6 +75,18 @@ def net_wrench(
     return NetWrench(force_N, moment_Nm, palm_m)
 
 
+def tip_loads_N(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> Array:
+    """Force on each fingertip without its own weight, shape (n, 5); zero without a valid reading."""
+    world_T_palm = samples.world_T_forearm @ forearm_T_palm_matrix(samples.joints_rad, side)
+    rotations = world_T_palm[:, None, :3, :3] @ palm_T_distal_matrices(samples.joints_rad, side)[..., :3, :3]
+    loads_N = np.zeros((len(samples.joints_rad), len(FINGERS)))
+    for finger, tip in fingertips.items():
+        at = FINGERS.index(finger)
+        felt = np.nan_to_num(tip.wrenches(samples.readings[:, at], rotations[:, at]))
+        loads_N[:, at] = np.linalg.norm(felt[:, :3], axis=1)
+    return loads_N
+
+
 def largest_net_N(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> float:
     """Largest force of all fingertips together along the table, smoothed over 20 ms."""
     along_N = gaussian_filter1d(

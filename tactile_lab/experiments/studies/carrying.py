@@ -7,7 +7,9 @@ from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs.carried_objects import MASS_kg, carry_object
+from tactile_lab.experiments.runs.carried_sessions import GRASPS, PALM, TOUCH, estimate_carried
 from tactile_lab.experiments.runs.weighed_objects import weigh_object
+from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE, REGISTRATION
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.experiments.studies.solids import EVERYDAY_SCANS, scans_left_out
 
@@ -61,6 +63,28 @@ CARRIES = Experiment(
     kind=_kind,
     grasps=5,
     left_out=lambda: scans_left_out(EVERYDAY_SCANS),
+)
+
+CARRIED_3D = Experiment(
+    "carried-3d",
+    "Sessions in space in which the hand carries the object after every grasp, with and without odometry in the hand.",
+    lambda grasps: grid(object=list(CATALOGUE), dimension=[3], grasps=[grasps], odometry=[PALM, TOUCH]),
+    estimate_carried,
+    (
+        REGISTRATION,
+        Column("registration above 5 mm", "lost", 0, kind="sum"),
+        HAUSDORFF,
+        MEAN_DISTANCE,
+        Column("grasps not placed", "untracked", 0, kind="sum"),
+        Column("grasps", "grasps_done", 0, kind="sum"),
+        Column("slid farthest, mm", "slid_mm", 1),
+        Column("odometry said, mm", "said_mm", 1),
+        Column("off by, mm", "said_off_mm", 1),
+        Column("stated, mm", "said_sigma_mm", 1),
+    ),
+    ranges("odometry", "Registration error, mm", "registration_mm", lambda cell: str(cell["object"])),
+    pooled=("object",),
+    grasps=GRASPS,
 )
 
 WEIGHING = Experiment(

@@ -19,6 +19,7 @@ from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import NullProgress
 from sessions.recording.recorder import NullRecorder
+from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.evaluation.registration import registration_rms_mm
@@ -49,11 +50,13 @@ class RigSession:
         mesh: the object, in its own frame.
         grasps: as measured.
         world_T_body: true pose of the object at each of them.
+        palm_motions: how the palm moved while it carried the object, from the grasp before to each of them.
     """
 
     mesh: trimesh.Trimesh
     grasps: tuple[Grasp, ...]
     world_T_body: tuple[Pose3, ...]
+    palm_motions: tuple[Pose3, ...]
 
 
 def settings(objects: Sequence[str], dimension: int, grasps: int) -> list[Setting]:
@@ -69,7 +72,7 @@ def estimate_on_rig(cell: Cell) -> dict[str, Any]:
     slam = TactileSlam(slam_settings(str(cell["method"]), dimension, motion), cell.seed)
     for grasp in session.grasps:
         slam.add_grasp(grasp)
-    return _figures(session, slam.finish())
+    return judge(session, slam.finish())
 
 
 def by_rule(rig: Rig, grasps: int) -> SessionSettings:
@@ -89,7 +92,8 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
     """Run a session on the simulated rig. Raises ConfigurationError for an object that it does not have."""
     rig = load_rig(RIG)
     world = simulated_world(rig, seed, object_name)
-    runtime, watch = build_runtime(rig, world, NullRecorder()), _TruthWatch(world)
+    runtime = build_runtime(rig, world, NullRecorder())
+    watch = _TruthWatch(world, runtime)
     slam = TactileSlam(slam_settings(_WHILE_RECORDING, dimension, rig.description.motion), seed)
     conductor = by_rule(rig, grasps)
     runtime.connect()
@@ -99,28 +103,41 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
     finally:
         runtime.close()
     count = min(len(outcome.grasps), len(watch.truth))
-    return RigSession(world.object_model.mesh, tuple(outcome.grasps[:count]), tuple(watch.truth[:count]))
+    grasps, truth, moved = (tuple(each[:count]) for each in (outcome.grasps, watch.truth, watch.palm_motions))
+    return RigSession(world.object_model.mesh, grasps, truth, moved)
 
 
 class _TruthWatch(NullProgress):
-    """Notes the object's true pose at each capture.
+    """Notes the object's true pose at each capture, and how the palm moved it since the one before.
 
     Args:
         world: the truth.
+        runtime: of the session.
     """
 
-    def __init__(self, world: SimulatedWorld) -> None:
-        self._world, self._captured = world, False
+    def __init__(self, world: SimulatedWorld, runtime: RigRuntime) -> None:
+        self._world, self._runtime, self._captured = world, runtime, False
+        self._held_at: Pose3 | None = None
+        self._moved = Pose3()
         self.truth: list[Pose3] = []
+        self.palm_motions: list[Pose3] = []
 
     def phase(self, number: int, name: str) -> None:
         """The first step after a capture: the object is still as it was measured."""
         if self._captured:
             self.truth.append(self._world.truth().world_T_object)
+            self.palm_motions.append(self._moved)
+            self._moved = Pose3()
         self._captured = name == "capture"
+        if name == "re-orient":
+            self._held_at = self._runtime.perception.world_T_palm
+        if name == "release" and self._held_at is not None:
+            self._moved = self._runtime.perception.world_T_palm * self._held_at.inverse()
+            self._held_at = None
 
 
-def _figures(session: RigSession, result: SlamResult) -> dict[str, Any]:
+def judge(session: RigSession, result: SlamResult) -> dict[str, Any]:
+    """Figures of an estimation of these grasps: shape, registration, how the session went."""
     mesh, truth = session.mesh, session.world_T_body
     if result.dimension == 2:
         shape = contour_figures(result.contour, true_outline(mesh))

@@ -56,6 +56,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "hands": ({"rig": ["sim-lite"]}, 1),
     "carries": ({"object": ["cube-6"], "mass_kg": ["0.3"]}, 2),
+    "carried-3d": ({"object": ["cube-6"]}, 2),
     "weighing": ({"object": ["cube-6"], "mass_kg": ["0.3"]}, 1),
     "everyday-objects": ({"object": ["cube-6"], "dimension": ["2"]}, 1),
     "camera-truth": ({"condition": ["sharp"]}, None),
@@ -70,6 +71,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
 LENGTHY = (
     "ablation",
     "carries",
+    "carried-3d",
     "weighing",
     "figure-3.12",
     "known-shape",

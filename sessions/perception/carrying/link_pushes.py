@@ -1,0 +1,131 @@
+"""Links that push the object while the hand closes: they have no sensors, but their motors work against something.
+
+A finger that closes through free space loads a motor by friction, damping and inertia alone:
+
+    counts = a + b v + c tanh(v / v0) + d dv/dt
+
+with the speed v of its joint. The four are fitted for each motor, robustly, to this session's newest closings as far as
+the finger's tip touched nothing. Counts beyond that are a link's. A joint near one of its ends is left out: there the
+hand presses against its own stop. What friction hides remains hidden, and is larger on real tendons; the scatter of the
+free motions sets the limit.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d, minimum_filter1d
+
+from drivers.core.clock import NANOSECONDS
+from drivers.core.contacts import FINGERS, Array
+from drivers.core.fingertip import ContinuousFingertip
+from drivers.shadow.model.motors import MotorMap
+from drivers.shadow.protocol.palm_images import Side
+from sessions.perception.carrying.carry_record import CarrySamples, SAMPLE_ns
+from sessions.perception.carrying.net_wrench import tip_loads_N
+
+_CLOSINGS = 6
+"""So many of the newest tell how a free finger moves."""
+_EVERY = 2
+"""Sample of which the free motions are fitted; the palm reads half of the motors in a cycle."""
+_SMOOTHING = 3.0
+"""Samples, of the joint angles; two thirds of it for counts and forces."""
+_STICTION_rad_s = 0.05
+_UNTOUCHED_N = 0.12
+_NEAR_END_rad = 0.05
+_NEAR_END_SAMPLES = 15
+_LEAST_COUNTS, _SIGMAS = 14.0, 4.0
+"""Of a push: more than this, and more than so many robust standard deviations of the free motions."""
+_PUSH_SAMPLES = 6
+"""In a row."""
+_FIT_SAMPLES, _FITS = 20, 6
+_MEDIAN_TO_SIGMA = 1.48
+
+
+@dataclass(frozen=True)
+class _Closing:
+    """What the motors did in one closing.
+
+    Attributes:
+        terms: of the free motion, shape (n, 20, 4).
+        counts: towards larger angles, shape (n, 20).
+        usable: where the finger's tip touches nothing and the joint is not near an end, shape (n, 20).
+    """
+
+    terms: Array
+    counts: Array
+    usable: NDArray[np.bool_]
+
+
+class LinkPushes:
+    """Learns how the motors move free fingers, and tells how long links have pushed.
+
+    Args:
+        motors: which motor pulls which joint.
+        fingertips: that measure forces while they move, by finger.
+        side: of the hand.
+    """
+
+    def __init__(self, motors: MotorMap, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> None:
+        self._motors, self._fingertips, self._side = motors, fingertips, side
+        fingers = [name[:2] for name in motors.names]
+        self._finger = np.array([FINGERS.index(finger) if finger in FINGERS else 0 for finger in fingers])
+        self._watched = np.array([finger in fingertips for finger in fingers])
+        self._closings: deque[_Closing] = deque(maxlen=_CLOSINGS)
+
+    def pushed_s(self, samples: CarrySamples) -> float:
+        """How long links of untouched fingers pushed in this closing, the fingers' times added."""
+        if samples.motor_counts is None or np.isnan(samples.motor_counts).any():
+            return 0.0
+        self._closings.append(newest := self._closing(samples, samples.motor_counts))
+        coefficients, limits = _free_motions(self._closings)
+        beyond = np.abs(newest.counts - np.einsum("nmk,mk->nm", newest.terms, coefficients)) > limits
+        pushing = beyond & newest.usable
+        by_finger = np.stack([pushing[:, self._finger == at].any(axis=1) for at in range(len(FINGERS))], axis=1)
+        return float(_runs(by_finger).sum() * SAMPLE_ns / NANOSECONDS)
+
+    def _closing(self, samples: CarrySamples, motor_counts: Array) -> _Closing:
+        angles_rad = samples.joints_rad @ self._motors.from_joints.T
+        step_s = float(np.diff(samples.stamps_ns).mean()) / NANOSECONDS
+        speeds = np.gradient(_smooth(angles_rad, _SMOOTHING), step_s, axis=0)
+        terms = [np.ones_like(speeds), speeds, np.tanh(speeds / _STICTION_rad_s), np.gradient(speeds, step_s, axis=0)]
+        loads_N = _smooth(tip_loads_N(samples, self._fingertips, self._side), 2 / 3 * _SMOOTHING)
+        lower_rad, upper_rad = self._motors.limits_rad.T + _NEAR_END_rad * np.array([[1.0], [-1.0]])
+        at_end = maximum_filter1d((angles_rad < lower_rad) | (angles_rad > upper_rad), _NEAR_END_SAMPLES, axis=0)
+        untouched = (loads_N < _UNTOUCHED_N)[:, self._finger]
+        counts = _smooth(motor_counts * self._motors.sign, 2 / 3 * _SMOOTHING)
+        return _Closing(np.stack(terms, axis=-1), counts, untouched & ~at_end & self._watched)
+
+
+def _free_motions(closings: deque[_Closing]) -> tuple[Array, Array]:
+    """Coefficients of each motor's free motion, shape (20, 4), and what counts beyond it are a push, shape (20,)."""
+    terms = np.concatenate([each.terms[::_EVERY] for each in closings]).transpose(1, 0, 2)
+    counts = np.concatenate([each.counts[::_EVERY] for each in closings]).T
+    usable = np.concatenate([each.usable[::_EVERY] for each in closings]).T
+    weights, number = usable.astype(float), usable.sum(axis=1)
+    coefficients, scatter = np.zeros(terms.shape[::2]), np.full(len(terms), np.inf)
+    for _ in range(_FITS):
+        weighted = terms * weights[..., None]
+        normal = weighted.transpose(0, 2, 1) @ terms + 1e-3 * np.eye(terms.shape[-1])
+        coefficients = np.linalg.solve(normal, np.einsum("mnk,mn->mk", weighted, counts)[..., None])[..., 0]
+        off = np.abs(counts - (terms @ coefficients[..., None])[..., 0])
+        ordered = np.sort(np.where(usable, off, np.inf), axis=1)
+        scatter = _MEDIAN_TO_SIGMA * ordered[range(len(off)), number // 2]
+        width = 2 * np.clip(scatter, _LEAST_COUNTS / 7, 1e6)
+        weights = usable / (1 + (off / width[:, None]) ** 2)
+    enough = number >= _FIT_SAMPLES / _EVERY
+    return coefficients, np.where(enough, np.maximum(_LEAST_COUNTS, _SIGMAS * scatter), np.inf)
+
+
+def _runs(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Only what is true at least :data:`_PUSH_SAMPLES` times in a row, along the first axis."""
+    kept = minimum_filter1d(flags, _PUSH_SAMPLES, axis=0, mode="constant")
+    return np.asarray(maximum_filter1d(kept, _PUSH_SAMPLES, axis=0, origin=-1))
+
+
+def _smooth(values: Array, samples: float) -> Array:
+    return np.asarray(gaussian_filter1d(values, samples, axis=0, mode="nearest"))

@@ -1,0 +1,65 @@
+"""How round a held object is: whether normals at its contacts show a turn, and whether it can roll.
+
+Where all normals go through one axis, an object turns about it without any fingertip entering or leaving it. Then only
+friction at the fingertips turns it, and what the table takes from that is a guess.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from sessions.perception.carrying.friction_balance import Balance
+from sessions.perception.carrying.tip_steps import TipSteps
+
+_ROUND_m = 0.007
+"""Lever at which an object is half as loose as a round one; cylinders have 1 mm, prisms and boxes 8 to 17 mm."""
+_LEAST_SHARE = 0.3
+"""Of the steps in which a finger has to touch to say how the sides lean."""
+_MOST_LEAN = 0.15
+_HELD_BY = 2
+"""So many fingertips hold an object; each further one holds its turn too."""
+_RCOND = 1e-3
+
+
+@dataclass(frozen=True)
+class Roundness:
+    """What the contacts of a carry show of the object.
+
+    Attributes:
+        loose: 1 for an object whose turn no normal shows, towards 0 for one with corners.
+        spare: fingertips beyond the two that any object needs, at least 0.5.
+        lean: sine of the angle by which its sides lean, at most 0.15.
+    """
+
+    loose: float
+    spare: float
+    lean: float
+
+    @classmethod
+    def of(cls, steps: TipSteps, balance: Balance) -> Roundness:
+        """Of a carry; one in which two fingertips never held the object at once is not called round."""
+        held = steps.felt.sum(axis=1) >= _HELD_BY
+        spare = max(float(steps.felt.sum(axis=1).mean()) - _HELD_BY, 0.5)
+        if not held.any():
+            return cls(0.0, spare, 0.0)
+        lever_m = float(np.median(_levers_m(balance.entering[held], balance.forces_N[held])))
+        return cls(1.0 / (1.0 + (lever_m / _ROUND_m) ** 2), spare, min(_lean(steps), _MOST_LEAN))
+
+
+def _levers_m(entering: Array, forces_N: Array) -> Array:
+    """Mean lever of the normal forces about the axis that they turn the object least about, shape (n,)."""
+    share = entering / forces_N.sum(axis=1)[:, None, None]
+    moved = np.linalg.pinv(share[:, :2, :2], rcond=_RCOND, hermitian=True) @ share[:, :2, 2:]
+    return np.sqrt(np.maximum(share[:, 2, 2] - (share[:, 2:, :2] @ moved)[:, 0, 0], 0.0))
+
+
+def _lean(steps: TipSteps) -> float:
+    felt = steps.felt.astype(float)
+    often = felt.mean(axis=0) > _LEAST_SHARE
+    if not often.any():
+        return 0.0
+    upward = (felt * steps.normals[..., 2]).sum(axis=0)[often] / felt.sum(axis=0)[often]
+    return float(np.sqrt(np.mean(upward**2)))

@@ -1,0 +1,154 @@
+"""Links that push while the hand closes, as the motors' strain gauges show them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.core.contacts import FINGERS, StepSigma
+from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS
+from drivers.simulation.calibration import SimulatedCalibration
+from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
+from sessions.perception.carrying.held_object import HeldObject
+from sessions.perception.carrying.link_pushes import LinkPushes
+
+MOTORS = SimulatedCalibration.from_package().motors
+COUNT, STEP_s = 200, 0.01
+PUSH = slice(90, 140)
+"""Half a second in which something is pushed."""
+
+
+class QuietTip:
+    """Its readings are its wrench."""
+
+    drift = np.zeros(6)
+
+    def reading(self) -> np.ndarray:
+        return np.zeros(6)
+
+    def touches(self, readings: np.ndarray, world_R_distal: np.ndarray) -> None:
+        raise AssertionError("contacts are not asked for")
+
+    def wrenches(self, readings: np.ndarray, world_R_distal: np.ndarray) -> np.ndarray:
+        return readings
+
+
+TIPS = {finger: QuietTip() for finger in FINGERS}
+
+
+def closing(chance: np.random.Generator, *, start_rad: float = 0.3) -> CarrySamples:
+    """Fingers that close freely: their motors work against friction, damping and inertia."""
+    speed = 0.25 * np.clip(np.arange(COUNT) / 20, 0.0, 1.0) * (1 + 0.4 * np.sin(0.05 * np.arange(COUNT)))
+    bends = np.array([name[-1] in "123" and not name.startswith("WR") for name in JOINTS])
+    joints_rad = start_rad + np.cumsum(speed)[:, None] * STEP_s * bends
+    speeds = np.gradient(joints_rad @ MOTORS.from_joints.T, STEP_s, axis=0)
+    counts = 3.0 + 25 * speeds + 8 * np.tanh(speeds / 0.05) + np.gradient(speeds, STEP_s, axis=0)
+    counts = MOTORS.sign * counts + 2.0 * chance.standard_normal(counts.shape)
+    stamps_ns = 1e9 * STEP_s * np.arange(COUNT)
+    return CarrySamples(stamps_ns, joints_rad, np.tile(np.eye(4), (COUNT, 1, 1)), np.zeros((COUNT, 5, 6)), counts)
+
+
+def pushing(samples: CarrySamples, joint: str, counts: float = 40.0, during: slice = PUSH) -> CarrySamples:
+    """The same with a link that works against something."""
+    assert samples.motor_counts is not None
+    changed = samples.motor_counts.copy()
+    changed[during, MOTORS.numbers[joint]] += counts
+    return replace(samples, motor_counts=changed)
+
+
+def watched(chance: np.random.Generator) -> LinkPushes:
+    """After two free closings."""
+    links = LinkPushes(MOTORS, TIPS, "right")
+    assert [links.pushed_s(closing(chance)) for _ in range(2)] == [0.0, 0.0]
+    return links
+
+
+@pytest.mark.parametrize("joint", ["RFJ3", "LFJ5", "FFJ0", "THJ5"])
+def test_a_link_that_pushes_is_noticed_for_as_long_as_it_does(joint: str) -> None:
+    chance = np.random.default_rng(1)
+    assert watched(chance).pushed_s(pushing(closing(chance), joint)) == pytest.approx(0.5, abs=0.06)
+    assert watched(chance).pushed_s(pushing(closing(chance), joint, -40.0)) == pytest.approx(0.5, abs=0.06)
+
+
+def test_times_of_several_fingers_add_up_and_those_of_one_fingers_motors_do_not() -> None:
+    chance = np.random.default_rng(2)
+    two_motors = pushing(pushing(closing(chance), "RFJ3"), "RFJ4")
+    assert watched(chance).pushed_s(two_motors) == pytest.approx(0.5, abs=0.06)
+    assert watched(chance).pushed_s(pushing(two_motors, "LFJ3")) == pytest.approx(1.0, abs=0.12)
+
+
+def test_a_short_jerk_is_no_push() -> None:
+    chance = np.random.default_rng(4)
+    assert watched(chance).pushed_s(pushing(closing(chance), "RFJ3", during=slice(90, 93))) == 0.0
+
+
+def test_what_the_fingertip_itself_does_is_no_push_of_a_link() -> None:
+    chance = np.random.default_rng(5)
+    touching = pushing(closing(chance), "RFJ3")
+    touching.readings[PUSH.start - 10 :, FINGERS.index("RF"), 1] = 0.5
+    assert watched(chance).pushed_s(touching) == 0.0
+
+
+def test_a_joint_that_presses_against_its_own_end_is_no_push() -> None:
+    chance = np.random.default_rng(6)
+    ended = closing(chance)
+    ended.joints_rad[PUSH.start - 10 :, JOINT_INDEX["THJ2"]] = np.radians(39.0)
+    assert watched(chance).pushed_s(pushing(ended, "THJ2", 150.0)) == 0.0
+
+
+def test_fingers_without_a_force_sensor_tell_nothing() -> None:
+    chance = np.random.default_rng(7)
+    links = LinkPushes(MOTORS, {"FF": QuietTip()}, "right")
+    assert links.pushed_s(pushing(closing(chance), "RFJ3")) == 0.0
+
+
+def test_a_hand_that_does_not_report_its_motors_tells_nothing() -> None:
+    silent = replace(closing(np.random.default_rng(8)), motor_counts=None)
+    assert LinkPushes(MOTORS, TIPS, "right").pushed_s(silent) == 0.0
+
+
+def test_motors_that_scatter_more_hide_more() -> None:
+    chance = np.random.default_rng(9)
+    links = LinkPushes(MOTORS, TIPS, "right")
+    for _ in range(3):
+        rough = closing(chance)
+        assert rough.motor_counts is not None
+        rubbing = np.repeat(60.0 * chance.standard_normal((COUNT // 8, 20)), 8, axis=0)
+        assert links.pushed_s(replace(rough, motor_counts=rough.motor_counts + rubbing)) < 0.3
+
+
+def test_samples_keep_what_motors_reported_only_if_all_did() -> None:
+    record = CarryRecord(TIPS)
+    record.begin()
+    for n in range(4):
+        counts = None if n == 0 else np.full(20, float(n))
+        record.take(n * 10_000_000, np.zeros(len(JOINTS)), np.eye(4), counts)
+    everything, later = record.since(0), record.since(10_000_000)
+    assert everything is not None
+    assert everything.motor_counts is None
+    assert later is not None
+    assert later.motor_counts is not None
+    assert later.motor_counts[:, 0].tolist() == [1.0, 2.0, 3.0]
+
+
+def test_a_push_widens_the_noise_of_the_step_that_it_ends() -> None:
+    chance = np.random.default_rng(10)
+    held = HeldObject(TIPS, "right", 1.0, MOTORS)
+    for number, taken in enumerate([closing(chance), closing(chance), pushing(closing(chance), "RFJ3")]):
+        _close(held, taken, from_ns=number * 10**10)
+    assert held.pushed_s == pytest.approx(0.5, abs=0.06)
+    known = StepSigma(0.0004, np.radians(0.3))
+    widened = held.then_closed(known)
+    assert widened is not None
+    assert widened.translation_m == pytest.approx(np.hypot(0.0004, held.odometry.noise.links_m_s * held.pushed_s))
+    assert widened.rotation_rad > 2 * known.rotation_rad
+
+
+def _close(held: HeldObject, taken: CarrySamples, from_ns: int) -> None:
+    assert taken.motor_counts is not None
+    held.on_close(from_ns)
+    for n in range(COUNT):
+        held.on_hand(from_ns + n * 10_000_000, taken.joints_rad[n], np.eye(4), taken.motor_counts[n])
+    held.on_capture(from_ns + COUNT * 10_000_000)

@@ -1,0 +1,55 @@
+"""What contacts show of an object's roundness, and what that does to the noise of a carry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gtsam import Pose2
+
+from drivers.core.contacts import FINGERS
+from sessions.perception.carrying.carry import CarryOdometry
+from sessions.perception.carrying.friction_balance import Balance
+from sessions.perception.carrying.roundness import Roundness
+from sessions.perception.carrying.tip_steps import TipSteps
+from tests.support.held_objects import BOX, DISC, carried
+
+TURN = Pose2(0.0, 0.0, 0.4)
+
+
+def turned(held: dict[str, tuple[list[float], list[float]]], fingers: int = 5, lean: float = 0.0) -> TipSteps:
+    """A carry in which an object turns with the hand, held by so many fingers; its sides lean."""
+    steps = carried(held, object_motion=TURN, palm_motion=TURN, count=40)
+    forces_N = steps.forces_N.copy()
+    forces_N[:, : len(FINGERS) - fingers] = 0.0
+    normals = steps.normals * np.sqrt(1 - lean**2) + np.array([0.0, 0.0, lean])
+    return replace(steps, forces_N=forces_N, normals=normals)
+
+
+def roundness(steps: TipSteps) -> Roundness:
+    return Roundness.of(steps, Balance.of(steps))
+
+
+def test_a_disc_is_loose_and_a_box_is_not() -> None:
+    assert roundness(turned(DISC)).loose > 0.95
+    assert roundness(turned(BOX)).loose < 0.6
+
+
+def test_each_finger_that_holds_a_round_object_makes_its_turn_more_certain() -> None:
+    sigmas_rad = [CarryOdometry({}, "right").carry(turned(DISC, count)).sigma.rotation_rad for count in (5, 4, 3)]
+    assert sigmas_rad[0] < 0.75 * sigmas_rad[1] < 0.5 * sigmas_rad[2]
+    assert sigmas_rad[2] > 0.05 * TURN.theta()
+
+
+def test_sides_that_lean_may_roll() -> None:
+    upright, leaning = (turned(DISC, lean=lean) for lean in (0.0, 0.1))
+    assert roundness(leaning).lean == pytest.approx(0.1, abs=0.01)
+    odometry = CarryOdometry({}, "right")
+    assert odometry.carry(leaning).sigma.translation_m > odometry.carry(upright).sigma.translation_m + 0.0001
+
+
+def test_an_object_that_nobody_holds_is_not_called_round() -> None:
+    steps = turned(DISC)
+    lost = replace(steps, forces_N=np.zeros_like(steps.forces_N))
+    assert roundness(lost) == Roundness(0.0, 0.5, 0.0)
