@@ -53,7 +53,7 @@ def _levers_m(entering: Array, forces_N: Array) -> Array:
     """Mean lever of the normal forces about the axis that they turn the object least about, shape (n,)."""
     share = entering / forces_N.sum(axis=1)[:, None, None]
     moved = np.linalg.pinv(share[:, :2, :2], rcond=_RCOND, hermitian=True) @ share[:, :2, 2:]
-    return np.sqrt(np.maximum(share[:, 2, 2] - (share[:, 2:, :2] @ moved)[:, 0, 0], 0.0))
+    return np.asarray(np.sqrt(np.maximum(share[:, 2, 2] - (share[:, 2:, :2] @ moved)[:, 0, 0], 0.0)))
 
 
 def _lean(steps: TipSteps) -> float:

@@ -103,8 +103,8 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
     finally:
         runtime.close()
     count = min(len(outcome.grasps), len(watch.truth))
-    grasps, truth, moved = (tuple(each[:count]) for each in (outcome.grasps, watch.truth, watch.palm_motions))
-    return RigSession(world.object_model.mesh, grasps, truth, moved)
+    done, truth, moved = tuple(outcome.grasps[:count]), tuple(watch.truth[:count]), tuple(watch.palm_motions[:count])
+    return RigSession(world.object_model.mesh, done, truth, moved)
 
 
 class _TruthWatch(NullProgress):
