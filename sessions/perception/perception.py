@@ -245,8 +245,9 @@ class Perception:
         return self._selection.drop_counts
 
     def problems(self) -> tuple[str, ...]:
-        """Problems of fingertips, each beginning with the finger's name."""
-        return tuple(f"{finger}: {text}" for finger, tip in self.fingertips.items() for text in tip.health())
+        """Problems of fingertips, each beginning with the finger's name, or ``fingertips`` for all of them."""
+        late = (f"fingertips: {self.held.delay.problem}",) if self.held.delay.problem else ()
+        return (*(f"{finger}: {text}" for finger, tip in self.fingertips.items() for text in tip.health()), *late)
 
     # --- session events
     # -------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry import Carry, CarryOdometry
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
+from sessions.perception.carrying.force_delay import ForceDelay
 from sessions.perception.carrying.link_pushes import LinkPushes
 from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.touch_capture import Measured
@@ -44,6 +45,8 @@ class HeldObject:
 
         self._from_ns, self._side = 0, side
         self._links = None if motors is None else LinkPushes(motors, self.fingertips, side)
+        self.delay = ForceDelay(self.fingertips, side)
+        """How late forces arrive."""
         self.pushed_s = 0.0
         """How long links pushed while the hand closed for the last capture."""
         self.closing_N = 0.0
@@ -80,6 +83,8 @@ class HeldObject:
         closing = self._record.since(self._from_ns) if self._record.is_open else None
         self.closing_N = 0.0 if closing is None else largest_net_N(closing, self.fingertips, self._side)
         self.pushed_s = 0.0 if closing is None or self._links is None else self._links.pushed_s(closing)
+        if closing is not None:
+            self.delay.on_closing(closing)
         self._from_ns = stamp_ns
         self._record.begin()
 
