@@ -101,6 +101,7 @@ class Grasp:
             as the palm moved; identity in the first grasp, and where the object was left in place.
         approach_paths: the fingers' approach paths, including those of fingers that met nothing; empty if unknown.
         motion_sigma: of that motion; None where only the rig's usual slip is known.
+        begins_anew: the object has fallen over since the previous grasp: nothing that was felt before holds any more.
     """
 
     index: int
@@ -110,6 +111,7 @@ class Grasp:
     hand_motion_world: Pose3 = field(default_factory=Pose3)
     approach_paths: tuple[ApproachPath, ...] = ()
     motion_sigma: StepSigma | None = None
+    begins_anew: bool = False
 
     @property
     def touching(self) -> frozenset[str]:

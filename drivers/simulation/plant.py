@@ -147,6 +147,21 @@ class Plant:
         found = [self._contact(index) for index in range(self._data.ncon)]
         return tuple(contact for contact in found if contact is not None)
 
+    def link_loads_N(self) -> dict[str, float]:
+        """Force of the object on each link of the hand without a sensor, by its name; those that it touches."""
+        loads_N: dict[str, float] = {}
+        for index in range(self._data.ncon):
+            pair = [int(geometry) for geometry in self._data.contact[index].geom]
+            bodies = [int(self._model.geom_bodyid[geometry]) for geometry in pair]
+            others = [g for g, body in zip(pair, bodies, strict=True) if body != self._object]
+            if len(others) != 1 or others[0] in self._tips or others[0] == self._table:
+                continue
+            wrench = np.zeros(6)
+            mujoco.mj_contactForce(self._model, self._data, index, wrench)
+            link = self._model.body(self._model.geom_bodyid[others[0]]).name
+            loads_N[link] = loads_N.get(link, 0.0) + float(np.linalg.norm(wrench[:3]))
+        return loads_N
+
     def _contact(self, index: int) -> TrueContact | None:
         contact = self._data.contact[index]
         first, second = int(contact.geom[0]), int(contact.geom[1])

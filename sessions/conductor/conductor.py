@@ -10,10 +10,20 @@ import numpy as np
 from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import TactileLabError
 from sessions.conductor.carrier import Carrier
-from sessions.conductor.decisions import DoGrasp, End, GraspAbandonedError, Pause, SessionRoles, UndoGrasp, Veto, Wait
+from sessions.conductor.decisions import (
+    DoGrasp,
+    End,
+    FindAgain,
+    GraspAbandonedError,
+    Pause,
+    SessionRoles,
+    UndoGrasp,
+    Veto,
+    Wait,
+)
 from sessions.conductor.estimation import Estimation
-from sessions.conductor.estimator import Estimate, Reorientation
-from sessions.conductor.object_gone import blocked, lost, not_found
+from sessions.conductor.estimator import Change, Estimate, Reorientation
+from sessions.conductor.object_gone import blocked, lost, not_found, nowhere
 from sessions.conductor.progress import GraspReport, NullProgress, Progress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.conductor.settings import ConductorSettings
@@ -42,7 +52,7 @@ class Conductor:
         self._runtime, self._settings = runtime, settings
         self._progress = progress or NullProgress()
         self._supervisor, self._cycle, self._decisions = roles.supervisor, roles.performer, roles.decisions
-        self._survey, self._guard = roles.survey, roles.guard
+        self._survey, self._find, self._guard = roles.survey, roles.find, roles.guard
         self._carrier = Carrier(runtime, roles, self._phase, self._tell)
         self._guard.heard = self._progress.on_interrupt
         self._estimation = Estimation(runtime, roles.estimator)
@@ -115,8 +125,29 @@ class Conductor:
                 if partial and not self._grasps:
                     return Ending.OBJECT_LOST, reason
                 return Ending.PARTIAL if partial else Ending.COMPLETE, reason
+            case FindAgain():
+                return self._find_again(decision)
             case Wait() | Pause():
                 self._cycle.idle()
+        return None
+
+    def _find_again(self, wanted: FindAgain) -> tuple[Ending, str] | None:
+        """Look for an object that may have fallen over or been pushed. Returns why to end if it is gone."""
+        search, self._prepared = wanted.search, None
+        if self._find is None:
+            return Ending.OBJECT_LOST, lost(search.reason, self._grasps)
+        self._tell(Level.WARNING, f"{search.reason}: the object is looked for")
+        self._phase("bounding box")
+        box = self._find(lambda: self._guard.requested, search.places_m, search.top_m)
+        if self._guard.requested:
+            return None
+        if not box.is_found:
+            return Ending.OBJECT_LOST, lost(f"{search.reason}, {nowhere(search.places_m)}", self._grasps)
+        self._supervisor.count_contacts(1)
+        change, words = wanted.found(box)
+        if change is not Change.STANDS:
+            self._runtime.note_object_moved(fell=change is Change.FELL)
+        self._tell(Level.INFO if change is Change.STANDS else Level.WARNING, words)
         return None
 
     def _consider(self, index: int) -> None:
@@ -151,7 +182,8 @@ class Conductor:
         if len(self._grasps) >= self._settings.grasps:
             return Ending.COMPLETE, f"{len(self._grasps)} grasps done"
         if self._misses >= self._settings.missed_approaches:
-            return Ending.OBJECT_LOST, blocked(self._misses, self._landings_m)
+            touched = any(grasp.contacts for grasp in self._grasps)
+            return Ending.PARTIAL if touched else Ending.OBJECT_LOST, blocked(self._misses, self._landings_m)
         if reason := self._supervisor.time_over(self._runtime.clock.now_ns()):
             return Ending.LIMIT, reason
         if reason := self._supervisor.object_lost(*self._decisions.centre_m):

@@ -14,7 +14,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.errors import TactileLabError
-from sessions.conductor.estimator import EstimatorService, PlannedGrasp, PoseStep, Reorientation
+from sessions.conductor.estimator import Change, EstimatorService, PlannedGrasp, PoseStep, Reorientation, Search
 from sessions.conductor.estimator_client import EstimatorClient
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
@@ -62,7 +62,20 @@ class End:
     partial: bool = False
 
 
-Decision: TypeAlias = DoGrasp | UndoGrasp | Wait | Pause | End
+@dataclass(frozen=True)
+class FindAgain:
+    """Look for the object before anything else.
+
+    Attributes:
+        search: how.
+        found: receives what was felt; returns what has become of the object, also in words.
+    """
+
+    search: Search
+    found: Callable[[BoundingBox], tuple[Change, str]]
+
+
+Decision: TypeAlias = DoGrasp | UndoGrasp | Wait | Pause | End | FindAgain
 
 
 @dataclass(frozen=True)
@@ -153,6 +166,8 @@ class SessionRoles:
             force of the fingers to it; None for a session that cannot.
         survey: measures the object's bounding box before the first grasp; its argument returns whether to skip the
             rest. None for a session without it.
+        find: the same for an object that may not be where it was, with the places and the height of a
+            :class:`~sessions.conductor.estimator.Search`.
         guard: receives Ctrl+C while the session runs; code that waits for a person checks it.
     """
 
@@ -163,6 +178,7 @@ class SessionRoles:
     weigh: Callable[[frozenset[str]], LiftEnd] | None = None
     foretell: Callable[[Grasp, float, Array], Forecast | None] | None = None
     survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
+    find: Callable[[Callable[[], bool], Array, float | None], BoundingBox] | None = None
     guard: InterruptGuard = field(default_factory=InterruptGuard)
 
 
@@ -195,11 +211,17 @@ class AutonomousDecisions:
     def decide(self, index: int) -> Decision:
         if self._planned is not None and self._planned.exhausted:
             return End(self._planned.exhausted, partial=True)
+        if self._planned is not None and self._planned.search is not None:
+            return FindAgain(self._planned.search, self._on_found_again)
         return Wait() if self._planned is None else DoGrasp(self._planned.plan)
 
     def on_bounding_box(self, box: BoundingBox) -> None:
         self._centre_m = None
         self.estimator.ask(EstimatorService.on_bounding_box, box)
+
+    def _on_found_again(self, box: BoundingBox) -> tuple[Change, str]:
+        self._centre_m = None
+        return self.estimator.ask(EstimatorService.on_found_again, box)
 
     def on_arrival(self, landings_world_m: list[Array]) -> None:
         self.estimator.ask(EstimatorService.on_landings, landings_world_m)

@@ -8,6 +8,7 @@ answers may come from its own process or from another one.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any, Protocol
 
 import numpy as np
@@ -122,6 +123,30 @@ class PolicyChoice(Protocol):
 
 
 @dataclass(frozen=True)
+class Search:
+    """The object may not be where it was: it has to be looked for.
+
+    Attributes:
+        reason: why, in words.
+        places_m: where it is tapped on, in this order, until something is met; world x, y, shape (n, 2).
+        top_m: height of its top before; if it is met so high at the first place it stands as it stood. None: its sides
+            are felt in any case.
+    """
+
+    reason: str
+    places_m: Array
+    top_m: float | None = None
+
+
+class Change(StrEnum):
+    """What has become of an object that was looked for."""
+
+    STANDS = "stands where it stood"
+    MOVED = "was pushed aside"
+    FELL = "fell over"
+
+
+@dataclass(frozen=True)
 class PlannedGrasp:
     """The next grasp.
 
@@ -129,11 +154,13 @@ class PlannedGrasp:
         plan: the grasp.
         choice: the policy's decision about it; None if no policy was asked.
         exhausted: why nothing is left to do, in words: the plan is none then. Empty while there is something.
+        search: how to look for the object first: the plan is none then. None where it is believed where it was.
     """
 
     plan: GraspPlan
     choice: PolicyChoice | None
     exhausted: str = ""
+    search: Search | None = None
 
 
 class GraspPlanner(Protocol):
@@ -150,6 +177,9 @@ class GraspPlanner(Protocol):
 
     def on_bounding_box(self, box: BoundingBox) -> None:
         """The object's bounding box was measured."""
+
+    def on_found_again(self, box: BoundingBox) -> tuple[Change, str]:
+        """The object was looked for, and met. Returns what has become of it, also in words."""
 
     def on_landings(self, points_world_m: list[Array]) -> None:
         """Fingertips landed on the object at these points, (3,) each."""

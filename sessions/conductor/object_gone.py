@@ -50,6 +50,13 @@ def blocked(approaches: int, landings_m: Sequence[Array]) -> str:
     )
 
 
+def nowhere(places_m: Array) -> str:
+    """Nothing was met at any of the places, world x, y, shape (n, 2), where an object was looked for."""
+    middle_m = np.mean(places_m, axis=0)
+    far_mm = 1e3 * float(np.linalg.norm(places_m - middle_m, axis=1).max())
+    return f"and {len(places_m)} taps up to {far_mm:.0f} mm around {_place(middle_m)} met nothing"
+
+
 def lost(reason: str, grasps: Sequence[Grasp]) -> str:
     """The object is not where it was.
 

@@ -72,7 +72,7 @@ class PolicyDecisions(AutonomousDecisions):
 
     def _is_approved(self, index: int, vetoed: int) -> bool:
         """Whether the person, if one is asked, approves the planned grasp."""
-        if self._planned is None:
+        if self._planned is None or self._planned.search is not None:
             return True
         return self._asked(Proposal(index + 1, self._planned.plan, vetoed, withdrawn=lambda: self._guard.requested))
 

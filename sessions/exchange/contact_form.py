@@ -155,6 +155,7 @@ class GraspEntry(StrictModel):
     contacts: tuple[ContactEntry, ...]
     hand_motion_world: RigidRows
     motion_sigma: StepSigmaEntry | None = None
+    begins_anew: bool = False
     world_T_palm: RigidRows | None = None
     closing_lines: tuple[LineEntry, ...] = ()
     world_T_object: RigidRows | None = None

@@ -154,6 +154,7 @@ def _grasp(index: int, entry: GraspEntry, document: Document) -> Grasp:
         hand_motion_world=Pose3(np.array(entry.hand_motion_world)),
         approach_paths=tuple(_closing_line(line) for line in entry.closing_lines),
         motion_sigma=None if own is None else StepSigma(own.translation_m, own.rotation_rad),
+        begins_anew=entry.begins_anew,
     )
 
 
@@ -206,6 +207,8 @@ def _grasp_entry(grasp: Grasp, world_T_object: Pose3 | None, log: ContactLog) ->
     }
     if grasp.motion_sigma is not None:
         entry["motion_sigma"] = asdict(grasp.motion_sigma)
+    if grasp.begins_anew:
+        entry["begins_anew"] = True
     if not np.array_equal(palm.matrix(), _assumed_palm(points).matrix()):
         entry["world_T_palm"] = palm.matrix().tolist()
     if grasp.approach_paths:

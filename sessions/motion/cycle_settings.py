@@ -13,7 +13,8 @@ class TouchSettings(StrictModel):
     """How the hand touches without grasping.
 
     Attributes:
-        tap_m_s: speed of the hand coming down on the top; a thumb, stiff in that direction, reaches 1.5 N at 35 mm/s.
+        tap_m_s: speed of the hand coming down on the top; a thumb, stiff in that direction, reaches 0.8 N, at 35 mm/s
+            1.5 N.
         near_m: from so far above a top that is known on the hand comes down slowly.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
@@ -26,8 +27,11 @@ class TouchSettings(StrictModel):
         rake_height_m: height of the fingertips' centres in a rake.
         rake_m_s: speed of a rake.
         rake_N: force that fingertips are brought to on a side: the sum must not move the object.
+        alone_N: the same where a single fingertip touches: less is not always felt.
         row_m: x of the fingertips in the row's own grasp frame.
         beyond_m: how far beyond the middle a rake goes.
+        past_side_m: how far behind the side of which it is known where it is, a touch goes: a finger that passes beside
+            it would push with a link.
         lowest_m: height of the fingertips over the table where a tap has missed the object.
         below_top_m: a tap without a grasp goes no farther below the top: what stands between the fingers, a neck or a
             rim, must not reach the knuckles.
@@ -36,11 +40,11 @@ class TouchSettings(StrictModel):
             forearm lets it come no lower; from higher up it would tip objects over.
     """
 
-    tap_m_s: float = Field(default=0.025, gt=0.0)
+    tap_m_s: float = Field(default=0.018, gt=0.0)
     near_m: float = Field(default=0.02, ge=0.0)
     met_N: float = Field(default=0.20, gt=0.0)
     force_N: float = Field(default=0.35, gt=0.0)
-    most_N: float = Field(default=0.6, gt=0.0)
+    most_N: float = Field(default=0.45, gt=0.0)
     reach_m: float = Field(default=0.008, ge=0.0)
     gain: float = Field(default=0.04, gt=0.0)
     sink_m: float = Field(default=0.004, ge=0.0)
@@ -49,8 +53,10 @@ class TouchSettings(StrictModel):
     rake_height_m: float = Field(default=0.028, gt=0.0)
     rake_m_s: float = Field(default=0.05, gt=0.0)
     rake_N: float = Field(default=0.15, gt=0.0)
+    alone_N: float = Field(default=0.25, gt=0.0)
     row_m: float = Field(default=0.012, ge=0.0)
     beyond_m: float = Field(default=0.030, ge=0.0)
+    past_side_m: float = Field(default=0.012, ge=0.0)
     lowest_m: float = Field(default=0.012, ge=0.0)
     below_top_m: float = Field(default=0.03, gt=0.0)
     side_m_s: float = Field(default=0.015, gt=0.0)
@@ -103,8 +109,8 @@ class CycleSettings(StrictModel):
     standoff_m: float = Field(default=0.13, gt=0.0)
     descent_m_s: float = Field(default=0.05, gt=0.0)
     landing_m_s: float = Field(default=0.018, gt=0.0)
-    beside_m_s: float = Field(default=0.08, gt=0.0)
-    approach_m_s: float = Field(default=0.05, gt=0.0)
+    beside_m_s: float = Field(default=0.05, gt=0.0)
+    approach_m_s: float = Field(default=0.03, gt=0.0)
     landing_force_N: float = Field(default=0.25, gt=0.0)
     landing_shift_m: float = Field(default=0.018, gt=0.0)
     landing_tries: int = Field(default=4, ge=1)

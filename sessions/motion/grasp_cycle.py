@@ -121,8 +121,8 @@ class GraspCycle:
     def _touch_side(self, plan: GraspPlan) -> SideTouch | None:
         """Touch the side that a grasp from the side comes from."""
         side = next(side for side in SIDES if plan.closing.endswith(side))
-        low_m = LOW_m if plan.only_touch else 0.0
-        return self._toucher.touch_side(plan.frame, side, self.settings.standoff_m, plan.height_m, low_m)
+        low_m, beyond_m = (LOW_m, self.settings.touch.past_side_m) if plan.only_touch else (0.0, 0.0)
+        return self._toucher.touch_side(plan.frame, side, self.settings.standoff_m, plan.height_m, low_m, beyond_m)
 
     def _move_above(self) -> None:
         s = self.settings

@@ -16,7 +16,7 @@ from gtsam import Pose3
 from pydantic import Field
 
 from drivers.core.configuration import StrictModel
-from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
+from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp, StepSigma
 from drivers.core.errors import DeviceError, SessionDataError
 from drivers.core.fingertip import FingertipSensor
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
@@ -41,6 +41,9 @@ from sessions.perception.touch_capture import Capture, Measured, Probed, TouchSe
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
 from sessions.recording.session_events import EventKind, SessionEvent
+
+_PUSHED = StepSigma(0.02, float(np.radians(15.0)))
+"""How far an object may have been pushed that was found again, standing as before."""
 
 
 class PerceptionSettings(StrictModel):
@@ -107,6 +110,9 @@ class Perception:
         self._tip_surfaces = dict(tip_surfaces or {})
         self._closing_start: HandGeometry | None = None
         self._probed = Probed()
+        self._unheld: dict[EventKind, set[int]] = {EventKind.OBJECT_MOVED: set(), EventKind.OBJECT_FELL: set()}
+        """The grasps before which the object was moved otherwise than by the hand that held it."""
+
         self._carried = HandOdometry()
         felt = self.fingertips if self.settings.odometry == "touch" else {}
         self.held = HeldObject(felt, form.side, self.settings.odometry_scale, motors)
@@ -288,7 +294,13 @@ class Perception:
             case EventKind.UNDO:
                 return self._undo()
             case _:
-                return self._scales.event(event, self.grasp_count - 1)
+                return self._otherwise(event)
+
+    def _otherwise(self, event: SessionEvent) -> Outcome | None:
+        if event.kind in self._unheld:
+            self._unheld[event.kind].add(self.grasp_count)
+            return None
+        return self._scales.event(event, self.grasp_count - 1)
 
     def _end_hold(self) -> None:
         carry = self.held.end_hold()
@@ -332,8 +344,14 @@ class Perception:
             world_T_palm=Pose3(measured.world_T_palm),
             hand_motion_world=motion.world if index else Pose3(),
             approach_paths=(*measured.ways, *probed.ways),
-            motion_sigma=self.held.then_closed(motion.sigma) if index else None,
+            motion_sigma=self._motion_sigma(index, motion.sigma),
+            begins_anew=index in self._unheld[EventKind.OBJECT_FELL],
         )
+
+    def _motion_sigma(self, index: int, felt: StepSigma | None) -> StepSigma | None:
+        if index in self._unheld[EventKind.OBJECT_MOVED]:
+            return _PUSHED
+        return self.held.then_closed(felt) if index else None
 
     def _end_capture(self, event: SessionEvent) -> Measured:
         """Contacts and geometry from the samples since the capture began."""

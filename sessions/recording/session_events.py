@@ -42,6 +42,10 @@ class EventKind(StrEnum):
     """Enough: compute its weight."""
     TRUTH_FRAME = "truth_frame"
     """The newest camera frame shows the object of the current grasp at rest."""
+    OBJECT_MOVED = "object_moved"
+    """The object was pushed since the last grasp: it was found again near by, standing as before."""
+    OBJECT_FELL = "object_fell"
+    """The object has fallen over since the last grasp: nothing that was felt of it before holds any more."""
     UNDO = "undo"
     """The last grasp is undone: the hand odometry before and after it belongs to the next one."""
 

@@ -265,6 +265,10 @@ class RigRuntime:
         """Keep the contacts of the samples since :meth:`begin_capture` for the next grasp."""
         self._record_event(EventKind.TOUCH_END)
 
+    def note_object_moved(self, *, fell: bool) -> None:
+        """The object was found again: pushed aside, or fallen over."""
+        self._record_event(EventKind.OBJECT_FELL if fell else EventKind.OBJECT_MOVED)
+
     def begin_hold(self) -> None:
         """From now on the object moves with the palm."""
         self._record_event(EventKind.HOLD_BEGIN)

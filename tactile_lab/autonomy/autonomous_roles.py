@@ -61,7 +61,8 @@ def autonomous_roles(
     if not settings.probing.is_wanted:
         return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.foretell, guard=guard)
     prober = BoxProber(Toucher(motion, settings.cycle, hand), settings.probing, window, settings.plan.start_m)
-    return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.foretell, prober.feel, guard)
+    felt = prober.feel, prober.find_again
+    return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.foretell, *felt, guard)
 
 
 def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, seed: int, dimension: int) -> Planner:

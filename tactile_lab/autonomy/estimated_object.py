@@ -33,10 +33,13 @@ class EstimatedObject:
         self.hand_motion = Pose3()
         """How the hand carried the object since the last grasp, world frame."""
 
+        self.is_outdated = False
+        """The object has fallen over since: nothing of the estimate holds any more."""
+
     def expected_pose(self) -> Pose2 | None:
         """Pose of the object after it was carried; None if unknown."""
         pose = self._slam.world_T_object
-        return None if pose is None or self._slam.is_lost else planar(self.hand_motion * pose)
+        return None if pose is None or self._slam.is_lost or self.is_outdated else planar(self.hand_motion * pose)
 
     def contacts_world(self) -> tuple[Array, Array]:
         """Contacts and outward normals of the surface in the world, shape (n, 3) each; none without a surface in space
@@ -54,7 +57,7 @@ class EstimatedObject:
 
         In space its surface is that of the most probable model, as in the result of a session.
         """
-        field = self._slam.surface
+        field = None if self.is_outdated else self._slam.surface
         if field is None:
             return None
         if self._known is None or self._known[0] is not field:

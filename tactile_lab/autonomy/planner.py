@@ -11,7 +11,7 @@ from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
-from sessions.conductor.estimator import Reorientation
+from sessions.conductor.estimator import Change, Reorientation, Search
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
@@ -88,9 +88,12 @@ class Planner:
         self._for_once = False
         """Whether it plans only one grasp or touch of an object that is otherwise grasped from above."""
 
-        self._blocked, self._standstill = 0, Standstill()
+        self._blocked, self._was_blocked, self._standstill = 0, False, Standstill()
         self.exhausted = ""
         """Why no action is left, in words; empty while there is one."""
+        self.search: Search | None = None
+        """How to look for the object before anything else; None where it is believed where it was."""
+
         self.choice: Choice | None = None
         """The policy's decision about the next grasp; None if the policy was not asked."""
 
@@ -127,12 +130,17 @@ class Planner:
     def _beside(self, index: int) -> GraspPlan | None:
         """A plan for an object that is too tall to pass over, or that blocked the descent; None for others.
 
-        After a blocked descent one touch is captured, if one is possible; then grasps come from above again.
+        After a blocked descent one touch is captured, if one is possible; then grasps come from above again. What
+        blocks the way down a second time stays where it stands.
         """
         if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
-            self._standing, self._for_once = self._standing_planner(), True
+            self._standing, self._for_once = self._standing_planner(), not self._was_blocked
+            self._was_blocked = True
         if self._standing is None:
             return None
+        self.search = self._standing.whereabouts.search()
+        if self.search is not None:
+            return self._rule.plan(index)
         plan = self._standing.plan()
         if plan is None and self._for_once:
             self._return_above()
@@ -143,13 +151,11 @@ class Planner:
     def _return_above(self) -> None:
         self._standing, self._for_once, self._blocked = None, False, 0
 
-    def _standing_planner(self, box: BoundingBox | None = None) -> StandingPlanner:
+    def _standing_planner(self, box: BoundingBox | None = None, searches: int = 0) -> StandingPlanner:
         """For the object as it was felt; without a box by the contacts of the estimate."""
         felt = FeltObject(box) if box is not None else self._felt_object()
-        window_rad = self._rule.settings.yaw_window_rad
-        return StandingPlanner(
-            felt, self._hand, window_rad, self._reach, self._touches if self._dimension == 3 else None
-        )
+        touches = self._touches if self._dimension == 3 else None
+        return StandingPlanner(felt, self._hand, self._rule.settings.yaw_window_rad, self._reach, touches, searches)
 
     def _felt_object(self) -> FeltObject:
         top_m = self._rule.top_m or HIGHEST_FROM_ABOVE_m
@@ -210,6 +216,27 @@ class Planner:
             self._rule.centre_m = box.centre_world_m
         if box.top_m is not None and box.top_m > HIGHEST_FROM_ABOVE_m:
             self._standing = self._standing_planner(box)
+
+    def on_found_again(self, box: BoundingBox) -> tuple[Change, str]:
+        """Note where the object is that was looked for. Returns what has become of it, also in words."""
+        assert self._standing is not None
+        known, self.search = self._standing.whereabouts, None
+        change = known.judge(box)
+        words = known.in_words(change, box, self._standing.felt.grasps)
+        if change is Change.FELL:
+            self._begin_anew(box)
+        if change is not Change.STANDS and (box.top_m or 0.0) > HIGHEST_FROM_ABOVE_m:
+            self._standing = self._standing_planner(box, known.searches)
+        return change, words
+
+    def _begin_anew(self, box: BoundingBox) -> None:
+        """Forget what was known of an object that fell over."""
+        self._object.is_outdated, self._standstill, self._landings_m = True, Standstill(), []
+        self._standing, self._for_once, self._blocked, self._doubted = None, False, 0, False
+        if self._chooser is not None:
+            self._chooser.begin_anew()
+        self.on_bounding_box(box)
+        self._rule.centre_m = box.centre_world_m
 
     def on_landings(self, points_world_m: list[Array]) -> None:
         """Note where fingertips landed on the object; used until the object is moved."""
@@ -302,10 +329,12 @@ class Planner:
             is_placed: whether its contacts were registered; if not, a policy must choose another place, or it would try
                 the same again.
         """
+        self._object.is_outdated = False
         if self._chooser is not None and not is_placed:
             self._chooser.on_unplaced_grasp()
         if self._standing is not None:
-            self._standing.on_estimate(is_placed)
+            self._standing.on_estimate(is_placed, *self._object.contacts_world())
+            self._rule.centre_m = self._standing.middle_m
         known, expected = self._object.known_shape(), self._object.expected_pose()
         if known is not None:
             self._standstill.note(known.explored)

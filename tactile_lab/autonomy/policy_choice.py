@@ -192,6 +192,10 @@ class PolicyChooser:
         """Note that the last grasp was not registered: its expected places are as unknown as before."""
         self._missed_m += self._met_m
 
+    def begin_anew(self) -> None:
+        """The object has fallen over: nothing that is known of it holds any more."""
+        self._expected, self._missed_m, self._met_m = None, [], []
+
     @property
     def may_leave(self) -> bool:
         """Whether the object stays in place unless there is a reason to turn it."""

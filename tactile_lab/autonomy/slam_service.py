@@ -16,7 +16,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
-from sessions.conductor.estimator import Estimate, PlannedGrasp, Reorientation
+from sessions.conductor.estimator import Change, Estimate, PlannedGrasp, Reorientation
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.estimate_messages import surface_message, trust_message
@@ -56,7 +56,7 @@ class SlamService:
         return self._planned(self.planner.replan(index))
 
     def _planned(self, plan: GraspPlan) -> PlannedGrasp:
-        return PlannedGrasp(plan, self.planner.choice, self.planner.exhausted)
+        return PlannedGrasp(plan, self.planner.choice, self.planner.exhausted, self.planner.search)
 
     def centre_m(self) -> Array:
         """As :attr:`Planner.centre_m`."""
@@ -76,6 +76,10 @@ class SlamService:
     def on_bounding_box(self, box: BoundingBox) -> None:
         """As :meth:`Planner.on_bounding_box`."""
         self.planner.on_bounding_box(box)
+
+    def on_found_again(self, box: BoundingBox) -> tuple[Change, str]:
+        """As :meth:`Planner.on_found_again`."""
+        return self.planner.on_found_again(box)
 
     def on_landings(self, points_world_m: list[Array]) -> None:
         """As :meth:`Planner.on_landings`."""

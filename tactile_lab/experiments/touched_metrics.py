@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import rotate, transform_points
+from drivers.shadow.closing.posture import HandShape
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.metrics.alignment import align_meshes
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh_with_normals
@@ -31,6 +32,12 @@ NOTHING_TOUCHED: dict[str, Any] = {
     "touched_within_2_sigma": None,
     "touched_share": None,
 }
+
+KNOWN_m = 0.005
+"""A place of the surface is known where the model is no farther from it, and says that it is not."""
+
+_PLACES, _DENTED_m = 8_000, 0.001
+"""Places that are looked at; a fingertip fits where it would dent the object no deeper than this."""
 
 _FACING_AWAY = -0.5
 _UNDERSIDE = -0.9
@@ -92,6 +99,30 @@ def touched_figures(data: Touched, result: Estimated) -> dict[str, Any]:
         "touched_within_2_sigma": float(np.mean(errors <= 2 * estimate.sigma_m[vertices])),
         "touched_share": float(touched_truth.area / data.mesh.area),
     }
+
+
+def known_share(estimate: SurfaceMesh | None, truth: trimesh.Trimesh) -> float:
+    """Share of the surface in a fingertip's reach where the model is within :data:`KNOWN_m`, at the best fit, and says
+    so with two standard deviations; 0 without a model.
+
+    Args:
+        estimate: the model.
+        truth: the object as it stands on the table, its lowest point on it.
+    """
+    if estimate is None:
+        return 0.0
+    points_m, normals = sample_mesh_with_normals(truth, _PLACES)
+    radius_m = HandShape().radius_m
+    tips_m = points_m + radius_m * normals
+    fits = distances_to_mesh(tips_m, truth) > radius_m - _DENTED_m
+    fits &= tips_m[:, 2] > float(truth.bounds[0][2]) + radius_m - _DENTED_m
+    seen = trimesh.Trimesh(estimate.vertices, estimate.faces, process=False)
+    fit = align_meshes(seen, truth, upright=True)
+    moved = trimesh.Trimesh(transform_points(fit, estimate.vertices), estimate.faces, process=False)
+    near = cKDTree(np.asarray(moved.vertices)).query(points_m[fits])[1]
+    is_known = distances_to_mesh(points_m[fits], moved) <= KNOWN_m
+    is_known &= 2 * estimate.sigma_m[near] <= KNOWN_m
+    return float(np.mean(is_known)) if fits.any() else 0.0
 
 
 class _Contacts:

@@ -14,6 +14,9 @@ Grasps that cannot be registered:
   ``placement_limit_m`` (few contacts, or a direction not observed): "uncertain". A particle filter does not use the
   contacts, because they could not be removed from its only map; joint hypotheses use them and remain revisable.
 
+Where an object has fallen over (:attr:`~drivers.core.contacts.Grasp.begins_anew`) the estimate begins anew, with a new
+object frame; grasps before that have no pose.
+
 A session is lost when the last ``lost_after`` grasps are untracked, or more than half of all. A grasp that was
 untracked when it was taken and has a place by now does not count.
 """
@@ -144,6 +147,8 @@ class TactileSlam:
             TrackingError: the grasp has entries that are not finite, or wrong units; nothing was changed.
         """
         started = time.perf_counter()
+        if grasp.begins_anew:
+            self._begin_anew()
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
         if self._tracker is None:
             return self._begin(grasp, started)
@@ -297,6 +302,10 @@ class TactileSlam:
         placed = self._tracker.map.placed if self._tracker else ()
         later = [False] * (len(self._steps) - len(placed)) + [grasp.used for grasp in placed]
         return [step.verdict == "untracked" and not used for step, used in zip(self._steps, later, strict=True)]
+
+    def _begin_anew(self) -> None:
+        self._tracker, self._origin_height_m, self._waiting = None, 0.0, ()
+        self._shape = CurrentShape(self._settings, self._settings.shape_model)
 
     def _begin(self, grasp: Grasp, started: float) -> SlamStep:
         """Define the object frame: origin at the contacts' centre, x axis along the palm's (section 3.4)."""

@@ -228,6 +228,9 @@ class DiscWorld:
     def end_touch(self) -> None:
         self._mark(EventKind.TOUCH_END)
 
+    def note_object_moved(self, *, fell: bool) -> None:
+        self._mark(EventKind.OBJECT_FELL if fell else EventKind.OBJECT_MOVED)
+
     def begin_hold(self) -> None:
         self._mark(EventKind.HOLD_BEGIN)
         self._held_from = self.perception.world_T_palm

@@ -10,7 +10,7 @@ span.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +29,9 @@ _ASSUMED_m = 0.030
 
 _AROUND = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 """Where the top is looked for next."""
+
+_SAME_TOP_m = 0.010
+"""An object that is met as high as before, but for so much, stands."""
 
 _BEYOND_m = -0.040
 """From the front to the grasp frame in which the open fingers stand 25 mm clear of it."""
@@ -102,7 +105,31 @@ class BoxProber:
         The palm passes over what is low: its sides are raked, if they are wanted. What is taller is touched from its
         sides in any case.
         """
-        top = np.empty((0, 3)) if stop() else self._feel_top(stop)
+        self._toucher.expect_tallest(self._settings.highest_m)
+        aside_m = (np.zeros(2), *(self._settings.around_m * np.array(way) for way in _AROUND))
+        top = self._feel_top([np.asarray(self._axes.transformFrom(place)) for place in aside_m], stop)
+        self._toucher.on_top(float(top[:, 2].max()) if len(top) else 0.0)
+        return self._feel_below(top, stop)
+
+    def find_again(self, stop: Callable[[], bool], places_m: Array, top_m: float | None) -> BoundingBox:
+        """Feel an object that may have fallen over or been pushed.
+
+        Args:
+            stop: as in :meth:`feel`.
+            places_m: where it is tapped on, until it is met, world x, y, shape (n, 2).
+            top_m: met so high at the first place it stands as it stood, and nothing else is felt; None: its sides are.
+        """
+        first = self._feel_top(places_m[:1], stop)
+        stands = top_m is not None and len(first) and abs(first[:, 2].max() - top_m) < _SAME_TOP_m
+        if stands:
+            return replace(self._box({}, dict.fromkeys(SIDES, "as before"), top_m), has_sides=False)
+        top = first if len(first) else self._feel_top(places_m[1:], stop)
+        if len(top):
+            self._toucher.on_top(float(top[:, 2].max()))
+            self._axes = Pose2(float(top[:, 0].mean()), float(top[:, 1].mean()), self._axes.theta())
+        return self._feel_below(top, stop)
+
+    def _feel_below(self, top: Array, stop: Callable[[], bool]) -> BoundingBox:
         top_m = float(top[:, 2].max()) if len(top) else None
         if top_m is not None and top_m > self._settings.tallest_m:
             return self._sides.feel(top[:, :2].mean(axis=0), top_m, stop)
@@ -122,16 +149,14 @@ class BoxProber:
     def _feel_side(self, side: str, found: Mapping[str, Array]) -> Array | str:
         return self._by_closing(found) if self._by_thumb(side) else self._rake(side)
 
-    def _feel_top(self, stop: Callable[[], bool]) -> Array:
-        """Where fingertips met the object when they were laid on, shape (n, 3): where it is expected, then around."""
-        self._toucher.expect_tallest(self._settings.highest_m)
-        around_m = self._settings.around_m
+    def _feel_top(self, places_m: Iterable[Array], stop: Callable[[], bool]) -> Array:
+        """Where fingertips met the object when they were laid on, shape (n, 3), at the first of the places, world x, y,
+        where they met anything.
+        """
         points: Array = np.empty((0, 3))
-        for aside_m in (np.zeros(2), *(around_m * np.array(way) for way in _AROUND)):
-            frame = GraspFrame(self._axes.x(), self._axes.y(), self._axes.theta()).shifted_inside(aside_m)
-            if stop() or len(points := self._toucher.tap(frame)):
+        for x_m, y_m in places_m:
+            if stop() or len(points := self._toucher.tap(GraspFrame(float(x_m), float(y_m), self._axes.theta()))):
                 break
-        self._toucher.on_top(float(points[:, 2].max()) if len(points) else 0.0)
         return points
 
     def _by_thumb(self, side: str) -> bool:

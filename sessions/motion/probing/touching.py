@@ -107,7 +107,13 @@ class Toucher:
         return np.array([contact.point_world_m for contact in contacts]) if contacts else found
 
     def touch_side(
-        self, frame: GraspFrame, side: str, from_m: float, height_m: float | None = None, all_up_to_m: float = 0.0
+        self,
+        frame: GraspFrame,
+        side: str,
+        from_m: float,
+        height_m: float | None = None,
+        all_up_to_m: float = 0.0,
+        beyond_m: float | None = None,
     ) -> SideTouch | None:
         """Come toward the middle of a grasp frame from its left or right, palm upright, fingers one above the other.
 
@@ -118,6 +124,7 @@ class Toucher:
             height_m: of the lowest fingertip; as low as the side allows unless given.
             all_up_to_m: fingertips up to this height are all laid against the side; above it only the one that met it:
                 several push an object over that one leaves standing.
+            beyond_m: how far over its origin; as the settings say unless given.
 
         Returns:
             What was touched, perhaps nothing; None where the hand could not come down.
@@ -126,9 +133,9 @@ class Toucher:
         lowest_m = s.side_heights_m[0 if side == side_with_first_finger_down(self._hand.form) else 1]
         table = closing(sideways(COLUMN.closing, side), height_m or lowest_m, self._hand)
         lane, column = frame.shifted_inside(np.array([-s.row_m, 0.0])), lowest_ahead(table, self._hand, all_up_to_m)
-        known = len(motion.runtime.perception.probed)
+        known, past_m = len(motion.runtime.perception.probed), s.beyond_m if beyond_m is None else beyond_m
         self._poise(table, column, lane, from_m)
-        begin, end = (motion.base_joints(lane, table, 0.0, away_m) for away_m in (from_m, -s.beyond_m))
+        begin, end = (motion.base_joints(lane, table, 0.0, away_m) for away_m in (from_m, -past_m))
         self.guard.restart()
         if not motion.probe_base(begin, self._cycle.beside_m_s, self.guard.is_met):
             self._rise_over(lane, table, from_m)
@@ -274,6 +281,7 @@ class Toucher:
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._hand)
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
+        force_N = force_N if len(rates) > 1 else max(force_N, s.alone_N)
         gone_m = dict.fromkeys(rates, 0.0)
         start, sunk_m, step_m = motion.runtime.perception.base_q.copy(), 0.0, 2.0 * sink_m / motion.cycles(s.press_s)
         way = np.zeros(6)

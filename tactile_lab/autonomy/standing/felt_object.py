@@ -23,6 +23,9 @@ round has no sides. A hand that closes on the corner of a box pushes it away."""
 _FAR_m, _NEAR_m = 0.04, 0.010
 """What is touched farther than the first from all contacts is as new as can be; nearer than the second it is known."""
 
+_UPWARD = 0.7
+"""Least vertical part of the normal of a contact on the top."""
+
 _ASSUMED_m = 0.030
 """From the middle to a side of which nothing is known."""
 
@@ -79,6 +82,11 @@ class FeltObject:
         low_m, high_m = np.minimum(self.box.low_m, places.min(0)), np.maximum(self.box.high_m, places.max(0))
         self.box = replace(self.box, low_m=low_m, high_m=high_m, top_m=top_m)
 
+    def place(self, points_m: Array, normals: Array) -> None:
+        """All contacts as they are placed by now, shape (n, 3) each, world frame: the object has moved a little."""
+        self._points_m, self._normals = [], []
+        self.add(points_m, normals)
+
     def on_looked(self, places_m: Sequence[Array]) -> None:
         """Something was looked for at these places, (3,) each, world: they are no longer new."""
         self._looked_m += places_m
@@ -131,6 +139,13 @@ class FeltObject:
     def is_unknown(self, places_m: Array) -> bool:
         """Whether places (n, 3) are on average far from all that is known."""
         return bool(self.distances_m(places_m).mean() > 2 * _NEAR_m)
+
+    @property
+    def top_place_m(self) -> Array:
+        """Where its top was met, world x, y; the middle of the box where it was not."""
+        points_m, normals = np.array(self._points_m).reshape(-1, 3), np.array(self._normals).reshape(-1, 3)
+        on_top = (normals[:, 2] > _UPWARD) & (points_m[:, 2] > (self.box.top_m or 0.0) - _NEAR_m)
+        return np.asarray(points_m[on_top, :2].mean(axis=0)) if on_top.any() else self.middle_m
 
     def in_words(self) -> str:
         """Its size, for people."""

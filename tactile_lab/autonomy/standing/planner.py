@@ -12,18 +12,16 @@ from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
-from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
+from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.search import Whereabouts
 from tactile_lab.autonomy.standing.side_planner import SidePlanner
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
 
 _GRASPS, _LEAST_GAIN = 3, 0.01
-_ASTRAY = 2
-"""Grasps in a row that went astray: the object does not stand where it stood."""
-
-_FALLEN = (
-    "has fallen over or was moved: {grasps} grasps in a row met less than half of what was expected, and fit nothing "
-    "felt before. Steady it (putty under its foot, more weight) or lay it down (--pose lying), and start again; {size}"
+_UNSTEADY = (
+    "does not stay where it is: it was looked for {searches} times already. Steady it (putty under its foot, more "
+    "weight) or lay it down (--pose lying), and start again; {size}"
 )
 
 
@@ -53,6 +51,7 @@ class StandingPlanner:
         yaw_window_rad: of the arm.
         reach: of the palm.
         settings: of touches; None for none.
+        searches: how often the object was looked for before.
     """
 
     felt: FeltObject
@@ -60,22 +59,23 @@ class StandingPlanner:
     yaw_window_rad: tuple[float, float]
     reach: SideReach
     settings: TouchSettings | None = None
+    searches: int = 0
     _current: StandingCandidate | None = None
     _touches: int = 0
     _blocked: int = 0
-    _astray: int = 0
-    _met_little: bool = False
+    whereabouts: Whereabouts = field(init=False)
     _grasping: SidePlanner = field(init=False)
     _touching: TouchPlanner | None = field(init=False)
 
     def __post_init__(self) -> None:
+        self.whereabouts = Whereabouts(self.felt, self.searches)
         where = (self.felt, self.hand, self.yaw_window_rad, self.reach)
         self._grasping = SidePlanner(*where)
         self._touching = None if self.settings is None else TouchPlanner(*where, self.settings)
 
     def plan(self) -> GraspPlan | None:
         """The next grasp or touch; None where nothing is left that would tell anything new, or it has fallen over."""
-        if self._astray >= _ASTRAY:
+        if self.whereabouts.is_given_up:
             return None
         offers = [self._grasping.best(), None if self._touching is None else self._touching.best()]
         self._current = max((one for one in offers if one), key=lambda one: one.score_m, default=None)
@@ -93,22 +93,26 @@ class StandingPlanner:
             return
         self._touches += done.plan.only_touch
         touched = frozenset() if done.plan.only_touch else grasp.touching
-        self._met_little = not done.plan.only_touch and len(touched) < len(done.touches) / 2
+        self.whereabouts.on_grasp(grasp, done, approach_of(done.plan, self.hand))
         self.felt.on_looked([place for finger, place in done.touches.items() if finger not in touched])
 
-    def on_estimate(self, is_placed: bool) -> None:
-        """Take note whether the contacts of the last grasp fit what was felt before."""
-        if is_placed:
-            self._astray = 0
-        elif self._met_little:
-            self._astray += 1
-        self._met_little = False
+    def on_estimate(self, is_placed: bool, points_m: Array, normals: Array) -> None:
+        """Take note whether the contacts of the last grasp fit what was felt before, and where all are placed by now.
+
+        Args:
+            is_placed: whether they fit.
+            points_m, normals: of all contacts that the estimate has, shape (n, 3), world frame; perhaps none.
+        """
+        self.whereabouts.on_estimate(is_placed)
+        if is_placed and len(points_m):
+            self.felt.place(points_m, normals)
 
     def on_blocked(self) -> None:
         """Take note that the hand met something on its way."""
         if (tried := self._current) is None:
             return
         self._blocked += 1
+        self.whereabouts.on_blocked()
         if not tried.plan.only_touch:
             self._grasping.blocked.append(tried)
         elif self._touching is not None:
@@ -122,8 +126,9 @@ class StandingPlanner:
     @property
     def exhausted(self) -> str:
         """Why there is nothing else to do, in words."""
-        if self._astray >= _ASTRAY:
-            return f"the object {_FALLEN.format(grasps=self._astray, size=self.felt.in_words())}{self._thinness}"
+        if self.whereabouts.is_given_up:
+            told = _UNSTEADY.format(searches=self.whereabouts.searches, size=self.felt.in_words())
+            return f"the object {told}{self._thinness}"
         grasps = self.felt.grasps - self._touches
         touches = f", {self._touches} touches" if self._touches else ""
         blocked = f", {self._blocked} approaches were blocked" if self._blocked else ""

@@ -32,6 +32,9 @@ _INSIDE_m = 0.008
 _ASKEW_rad = np.radians(20.0)
 """A side that the arm cannot turn to squarely is touched so much from aside: fingertips do not slip yet."""
 
+_SQUARELY = 0.7
+"""Of the half width of what is round: farther aside a finger passes beside it, and a link meets it."""
+
 _FINGERS_APART_m = 0.023
 """In a hand whose palm is upright."""
 
@@ -111,8 +114,8 @@ class TouchPlanner:
     def _on_side(self, yaw_rad: float, name: str, lowest_m: float) -> Iterator[StandingCandidate]:
         box, across = self.felt.standing_box, np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.hand)
-        half_m = box.half_along_m(way)
-        for lane_m in _places(box.half_along_m(across), _LANES_APART_m):
+        half_m, wide_m = box.half_along_m(way), box.half_along_m(across)
+        for lane_m in _places(_SQUARELY * wide_m if self.felt.is_round else wide_m, _LANES_APART_m):
             lane = np.array([box.x_m, box.y_m]) + lane_m * across
             if box.distances_m(np.array([*lane, box.size_m[2] / 2])) > -_INSIDE_m:
                 continue

@@ -8,8 +8,10 @@ was, and the model.
 from __future__ import annotations
 
 import time
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -19,7 +21,7 @@ from gtsam import Pose3
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array, Grasp
-from drivers.core.poses import rotation_angle_rad, transform_points
+from drivers.core.poses import planar, rotation_angle_rad, spatial, transform_points
 from drivers.simulation.object_names import MESH_PREFIX, in_pose
 from drivers.simulation.world import SimulatedWorld
 from sessions.conductor.conductor import Conductor
@@ -35,7 +37,7 @@ from tactile_lab.experiments.data.silhouettes import places, silhouettes
 from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
-from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, touched_figures
+from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, known_share, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.slam.result import SlamResult
@@ -117,7 +119,7 @@ class ForceWatch(NullProgress):
     def __init__(self, world: SimulatedWorld) -> None:
         self._world, self._phase = world, ""
         self._first_ns, self._first = world.clock.now_ns(), world.truth().world_T_object
-        self._most_N = {True: 0.0, False: 0.0}
+        self._most_N, self._most_link_N = {True: 0.0, False: 0.0}, 0.0
         self.truth: list[Pose3] = []
         """The object's pose at each capture."""
 
@@ -133,14 +135,19 @@ class ForceWatch(NullProgress):
         """Record the truth once per cycle."""
         if link == HAND_LINK:
             grasping = self._phase in ("close", "capture", "squeeze", "re-orient", "release")
-            forces_N = [contact.force_N for contact in self._world.truth().contacts]
-            self._most_N[grasping] = max([self._most_N[grasping], *forces_N])
+            forces_N: dict[str, float] = defaultdict(float)
+            for contact in self._world.truth().contacts:
+                forces_N[contact.finger] += contact.force_N
+            self._most_N[grasping] = max([self._most_N[grasping], *forces_N.values()])
+            if not grasping:
+                self._most_link_N = max([self._most_link_N, *self._world.plant.link_loads_N().values()])
 
     def figures(self) -> dict[str, Any]:
         """Forces, displacement of the object, and simulated time of the session."""
         moved = self._first.inverse() * self._world.truth().world_T_object
         return {
             "outside_N": self._most_N[False],
+            "link_N": self._most_link_N,
             "grasp_N": self._most_N[True],
             "moved_mm": 1e3 * float(np.linalg.norm(moved.translation())),
             "turned_deg": float(np.degrees(rotation_angle_rad(moved))),
@@ -162,30 +169,48 @@ def _ending(outcome: SessionOutcome) -> dict[str, Any]:
 
 def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, dimension: int) -> dict[str, Any]:
     """The model against the truth: everywhere, and in space also over what was touched, with a picture's lines."""
-    mesh, poses = watch.mesh, result.world_T_object
-    count = min(len(poses), len(watch.truth), len(grasps))
-    done, truth = grasps[:count], watch.truth[:count]
+    seen = _as_it_lies(result, grasps, watch)
+    mesh, poses, truth, done = seen.mesh, seen.estimate, seen.world_T_body, seen.grasps
     points = [grasp.points_world_m for grasp in done]
     shape = contour_figures(result.contour, true_outline(mesh)) if dimension == 2 else mesh_figures(result.mesh, mesh)
-    registration = registration_rms_mm(points, poses[:count], truth, dimension) if count else None
+    registration = registration_rms_mm(points, poses, truth, dimension) if done else None
     figures = {**shape, "registration_mm": registration, **NOTHING_TOUCHED}
+    if dimension == 3:
+        figures["known_share"] = known_share(result.mesh, mesh)
     if dimension == 3 and any(grasp.contacts for grasp in done):
-        return {**figures, **touched_figures(TouchedObject(mesh, truth, done), result), **_picture(result, done, watch)}
+        return {**figures, **touched_figures(seen, result), **_picture(result, seen)}
     return figures
 
 
-def _picture(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Seen(TouchedObject):
+    """An object with its true and estimated poses at the grasps that the model is made of."""
+
+    estimate: Sequence[Pose3 | None] = ()
+
+
+def _as_it_lies(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) -> _Seen:
+    """The object as it stands or, after a fall, lies: its mesh upright there, and the grasps from then on."""
+    count = min(len(result.world_T_object), len(watch.truth), len(grasps))
+    begun = max([0, *(place for place, grasp in enumerate(grasps[:count]) if grasp.begins_anew)])
+    lying = spatial(planar(watch.truth[begun])).inverse() * watch.truth[begun] if begun else Pose3()
+    mesh = trimesh.Trimesh(transform_points(lying, watch.mesh.vertices), watch.mesh.faces, process=False)
+    truth = [pose * lying.inverse() for pose in watch.truth[begun:count]]
+    return _Seen(mesh, truth, grasps[begun:count], result.world_T_object[begun:count])
+
+
+def _picture(result: SlamResult, seen: _Seen) -> dict[str, Any]:
     """Silhouettes of the object and of the model laid over it, and where contacts were, in the object's frame."""
-    pairs = list(zip(watch.truth, grasps, strict=False))
+    pairs = list(zip(seen.world_T_body, seen.grasps, strict=False))
     by_kind = {
         kind: np.vstack(
             [np.empty((0, 3)), *(transform_points(pose.inverse(), _points(grasp, probed)) for pose, grasp in pairs)]
         )
         for kind, probed in (("closed", False), ("probed", True))
     }
-    shown = {"true": silhouettes(watch.mesh), **{kind: places(points_m) for kind, points_m in by_kind.items()}}
+    shown = {"true": silhouettes(seen.mesh), **{kind: places(points_m) for kind, points_m in by_kind.items()}}
     if result.mesh is not None:
-        fit = align_meshes(result.mesh, watch.mesh, upright=True)
+        fit = align_meshes(result.mesh, seen.mesh, upright=True)
         moved = trimesh.Trimesh(transform_points(fit, result.mesh.vertices), result.mesh.faces, process=False)
         shown["model"] = silhouettes(moved)
     return {"picture": shown}

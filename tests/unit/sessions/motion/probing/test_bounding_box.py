@@ -90,7 +90,7 @@ def test_object_beyond_the_search_is_told() -> None:
 
 
 def test_probing_can_be_interrupted_between_sides() -> None:
-    asked = iter([False, False, False, True, True, True])
+    asked = iter([False, False, True, True, True])
     box = prober(DiscWorld(Disc(np.zeros(2), radius_m=0.035))).feel(lambda: next(asked))
     assert box.top_m is not None
     assert [box.missing.get(side) for side in SIDES[1:]] == ["interrupted"] * 3

@@ -10,6 +10,7 @@ from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
+from sessions.conductor.estimator import Change
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
@@ -23,6 +24,7 @@ from tactile_lab.autonomy.variance_planner import ExplorationSettings
 
 TIP = HandShape()
 WINDOW_rad = (-1.31, 1.31)
+NOTHING = np.empty((0, 3))
 
 
 def box(width_m: float = 0.066, length_m: float = 0.105, top_m: float = 0.187, turn_rad: float = 0.3) -> BoundingBox:
@@ -38,7 +40,7 @@ def planner(felt: BoundingBox) -> StandingPlanner:
 def grasp(points_m: np.ndarray, fingers: list[str]) -> Grasp:
     """Contacts on the sides of the box that :func:`box` is."""
     low, turn = np.array([0.033, 0.0525]), Pose2(0.01, 0.0, 0.3)
-    inside = np.array([turn.transformTo(point[:2]) for point in points_m])
+    inside = np.array([turn.transformTo(point[:2]) for point in points_m]).reshape(-1, 2)
     beyond = np.abs(inside) - low
     own = np.where(beyond == beyond.max(axis=1, keepdims=True), np.sign(inside), 0.0)
     normals = np.array([[*turn.rotation().matrix() @ normal, 0.0] for normal in own])
@@ -108,22 +110,56 @@ def meet_one(beside: StandingPlanner, *, is_placed: bool) -> bool:
         return False
     touches = expected_touches(plan, TIP, standing(beside.felt.box), standing(beside.felt.box))
     beside.on_grasp(grasp(np.array([touches["TH"]]), ["TH"]))
-    beside.on_estimate(is_placed)
+    beside.on_estimate(is_placed, NOTHING, NOTHING)
     return True
 
 
-def test_grasps_that_hardly_meet_what_fits_nothing_end_with_a_fallen_object() -> None:
+def test_an_object_that_is_hardly_met_is_looked_for_with_its_sides_and_given_up_the_fifth_time() -> None:
     beside = planner(box())
+    for _ in range(4):
+        assert meet_one(beside, is_placed=False)
+        assert beside.whereabouts.search() is None
+        assert meet_one(beside, is_placed=False)
+        search = beside.whereabouts.search()
+        assert search is not None
+        assert search.reason.startswith("2 grasps in a row met less than half of what was expected")
+        assert search.top_m is None
+        assert beside.whereabouts.judge(beside.felt.box) is Change.STANDS
+        assert beside.whereabouts.search() is None
     assert meet_one(beside, is_placed=False)
     assert meet_one(beside, is_placed=False)
-    assert not meet_one(beside, is_placed=False)
-    assert beside.exhausted.startswith("the object has fallen over or was moved: 2 grasps in a row")
-    assert beside.exhausted.endswith("mm high")
+    assert beside.plan() is None
+    assert beside.exhausted.startswith("the object does not stay where it is: it was looked for 4 times already")
+    assert "mm high" in beside.exhausted
+
+
+def test_a_grasp_that_meets_nothing_has_the_top_looked_for_where_it_was_and_beside_it_the_way_it_was_pushed() -> None:
+    beside = planner(box())
+    assert beside.plan() is not None
+    beside.on_grasp(grasp(NOTHING, []))
+    search = beside.whereabouts.search()
+    assert search is not None
+    assert "met nothing where" in search.reason
+    assert search.top_m == pytest.approx(beside.felt.box.top_m)
+    np.testing.assert_allclose(search.places_m[0], beside.felt.top_place_m)
+    along_m = np.linalg.norm(search.places_m[1:3] - beside.felt.middle_m, axis=1)
+    np.testing.assert_allclose(along_m, [0.35 * 0.187, 0.6 * 0.187])
+
+
+@pytest.mark.parametrize(
+    ("top_m", "aside_m", "change"),
+    [(0.187, 0.0, Change.STANDS), (0.187, 0.02, Change.MOVED), (0.06, 0.08, Change.FELL), (0.163, 0.0, Change.FELL)],
+)
+def test_what_is_found_again_stands_or_was_moved_or_fell(top_m: float, aside_m: float, change: Change) -> None:
+    beside = planner(box())
+    found = box(top_m=top_m).move(Pose2(aside_m, 0.0, 0.0))
+    assert beside.whereabouts.judge(found) is change
+    assert str(change) in beside.whereabouts.in_words(change, found, 3)
 
 
 def test_a_fallen_rod_is_said_to_be_thin() -> None:
     beside = planner(box(width_m=0.010, length_m=0.012))
-    beside._astray = 2
+    beside.whereabouts.searches, beside.whereabouts._reason = 4, "grasp 7 met nothing"
     assert beside.exhausted.endswith("the object is 10 x 12 mm wide and 187 mm high, thinner than a fingertip of 17 mm")
 
 
