@@ -311,7 +311,7 @@ class Perception:
     def _tare(self, event: SessionEvent) -> TareReport:
         self._placement.latest()
         if set(self.fingertips) <= set(event.fingers):
-            self.held.on_left()
+            self.held.on_tare(event.stamp_ns)
         self._loads_N = None
         refused = {}
         for finger in event.fingers:

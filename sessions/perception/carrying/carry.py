@@ -48,15 +48,16 @@ class CarryNoise:
             explains: links pushed the object then, which feel nothing.
         closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
         links_m_s, links_rad_s: for each second in which links pushed meanwhile.
+        landed_m_s, landed_rad_s: for each second in which links were on the object when the hand came down before.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
 
     least_m: float = 0.00008
     least_rad: float = float(np.deg2rad(0.04))
-    spread_m: float = 1.2
+    spread_m: float = 1.1
     spread_rad: float = 0.2
-    slip_m: float = 0.02
+    slip_m: float = 0.019
     slip_rad: float = 0.037
     round_rad: float = 0.083
     roll_m: float = 0.0045
@@ -68,7 +69,19 @@ class CarryNoise:
     closed_rad_N: float = float(np.deg2rad(1.9))
     links_m_s: float = 0.0026
     links_rad_s: float = float(np.deg2rad(3.0))
+    landed_m_s: float = 0.007
+    landed_rad_s: float = float(np.deg2rad(10.0))
     unseen: float = 0.5
+
+    @property
+    def after_m(self) -> tuple[float, float, float]:
+        """Of what happens once the hand is open: net force, links that push, links that land."""
+        return self.closed_m_N, self.links_m_s, self.landed_m_s
+
+    @property
+    def after_rad(self) -> tuple[float, float, float]:
+        """The same of the turn."""
+        return self.closed_rad_N, self.links_rad_s, self.landed_rad_s
 
 
 @dataclass(frozen=True)
@@ -153,19 +166,19 @@ class CarryOdometry:
         half_width_m = float(np.clip(half_m, _LEAST_HALF_WIDTH_m, _LARGEST_HALF_WIDTH_m))
         return self.measured.known(Friction(half_width_m=half_width_m))
 
-    def closed(self, sigma: StepSigma, closing_N: float, pushed_s: float = 0.0) -> StepSigma:
+    def closed(self, sigma: StepSigma, closing_N: float, pushed_s: float = 0.0, landed_s: float = 0.0) -> StepSigma:
         """How well the object's place is known once the hand has closed again.
 
         Args:
             sigma: before.
             closing_N: largest net force of the fingertips meanwhile.
             pushed_s: how long links pushed.
+            landed_s: how long they were on the object when the hand came down before.
         """
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
-        parts_m = np.array([noise.closed_m_N * excess_N, noise.links_m_s * pushed_s])
-        parts_rad = np.array([noise.closed_rad_N * excess_N, noise.links_rad_s * pushed_s])
-        translation_m = np.linalg.norm([sigma.translation_m, *self._scale * parts_m])
-        rotation_rad = np.linalg.norm([sigma.rotation_rad, *self._scale * parts_rad])
+        causes = self._scale * np.array([excess_N, pushed_s, landed_s])
+        translation_m = np.linalg.norm([sigma.translation_m, *causes * noise.after_m])
+        rotation_rad = np.linalg.norm([sigma.rotation_rad, *causes * noise.after_rad])
         return StepSigma(float(translation_m), float(rotation_rad))
 
     def estimate(self, samples: CarrySamples) -> Carry:

@@ -39,16 +39,18 @@ class HeldObject:
         motors: MotorMap | None = None,
     ) -> None:
         self.fingertips = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
-        self._record = CarryRecord(self.fingertips)
+        self._record, self._descent = CarryRecord(self.fingertips), CarryRecord(self.fingertips)
         self.odometry = CarryOdometry(self.fingertips, side, scale)
         """Estimates the carries."""
 
-        self._from_ns, self._side = 0, side
+        self._from_ns, self._tared_ns, self._side = 0, 0, side
         self._links = None if motors is None else LinkPushes(motors, self.fingertips, side)
         self.delay = ForceDelay(self.fingertips, side)
         """How late forces arrive."""
         self.pushed_s = 0.0
         """How long links pushed while the hand closed for the last capture."""
+        self.landed_s, self._is_grasped = 0.0, False
+        """How long they were on the object while the hand came down for it."""
         self.closing_N = 0.0
         """Largest net force of the fingertips along the table while the hand closed for the last capture.
 
@@ -64,17 +66,38 @@ class HeldObject:
 
     @property
     def is_watched(self) -> bool:
-        """Whether an object is grasped, and :meth:`on_hand` is wanted."""
-        return self._record.is_open
+        """Whether an object is grasped, or is going to be, and :meth:`on_hand` is wanted."""
+        return self._record.is_open or self._descent.is_open
 
     def on_hand(
         self, stamp_ns: int, joints_rad: Array, world_T_forearm: Array, motor_counts: Array | None = None
     ) -> None:
         """Joint angles, shape (24,), the forearm's pose, shape (4, 4), and the motors' strain gauges, shape (20,)."""
-        self._record.take(stamp_ns, joints_rad, world_T_forearm, motor_counts)
+        for record in (self._record, self._descent):
+            if record.is_open:
+                record.take(stamp_ns, joints_rad, world_T_forearm, motor_counts)
+
+    def on_tare(self, stamp_ns: int) -> None:
+        """The hand is above the object and free, and comes down for it; or it has risen to come down again."""
+        self._come_down(stamp_ns)
+        self._record.end()
+        if self._is_grasped:
+            self.landed_s, self._is_grasped = 0.0, False
+        if self._links is not None:
+            self._tared_ns = stamp_ns
+            self._descent.begin()
+
+    def _come_down(self, until_ns: int) -> None:
+        """Whatever links landed on from the tare until now counts."""
+        down = self._descent.since(self._tared_ns) if self._descent.is_open else None
+        down = None if down is None else down.until(until_ns)
+        if down is not None and self._links is not None:
+            self.landed_s += self._links.landed_s(down)
+        self._descent.end()
 
     def on_close(self, stamp_ns: int) -> None:
         """The fingers begin to close; the object may be pushed."""
+        self._come_down(stamp_ns)
         self._from_ns = stamp_ns
         self._record.begin()
 
@@ -90,7 +113,7 @@ class HeldObject:
 
     def on_grasp(self, measured: Measured) -> None:
         """The capture's contacts; the object was where they say in the middle of the capture."""
-        self._from_ns = measured.stamp_ns
+        self._from_ns, self._is_grasped = measured.stamp_ns, True
         if measured.contacts:
             self.contact_height_m = float(np.mean([contact.point_world_m[2] for contact in measured.contacts]))
         self.odometry.on_grasp(measured.contacts)
@@ -103,6 +126,7 @@ class HeldObject:
     def on_left(self) -> None:
         """The object is not held."""
         self._record.end()
+        self._descent.end()
 
     def samples_since(self, stamp_ns: int) -> CarrySamples | None:
         """Readings of hand and fingertips since a moment of this grasp; None for too little."""
@@ -116,7 +140,7 @@ class HeldObject:
 
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
-        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, self.pushed_s)
+        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, self.pushed_s, self.landed_s)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
         """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""

@@ -1,4 +1,4 @@
-"""Links that push the object while the hand closes: they have no sensors, but their motors work against something.
+"""Links that push the object while the hand comes down and closes: they have no sensors, but their motors work.
 
 A finger that closes through free space loads a motor by friction, damping and inertia alone:
 
@@ -8,6 +8,9 @@ with the speed v of its joint. The four are fitted for each motor, robustly, to 
 the finger's tip touched nothing. Counts beyond that are a link's. A joint near one of its ends is left out: there the
 hand presses against its own stop. What friction hides remains hidden, and is larger on real tendons; the scatter of the
 free motions sets the limit.
+
+While the open hand comes down its fingers stand still, and every motor shows one number. A link that lands on the
+object changes it.
 """
 
 from __future__ import annotations
@@ -42,6 +45,8 @@ _LEAST_COUNTS, _SIGMAS = 14.0, 4.0
 """Of a push: more than this, and more than so many robust standard deviations of the free motions."""
 _PUSH_SAMPLES = 6
 """In a row."""
+_LANDED_COUNTS, _STILL_rad_s = 30.0, 0.15
+"""Of a landing; open fingers that come down freely stay within 30 counts."""
 _FIT_SAMPLES, _FITS = 20, 6
 _MEDIAN_TO_SIGMA = 1.48
 
@@ -84,15 +89,27 @@ class LinkPushes:
         self._closings.append(newest := self._closing(samples, samples.motor_counts))
         coefficients, limits = _free_motions(self._closings)
         beyond = np.abs(newest.counts - np.einsum("nmk,mk->nm", newest.terms, coefficients)) > limits
-        pushing = beyond & newest.usable
-        by_finger = np.stack([pushing[:, self._finger == at].any(axis=1) for at in range(len(FINGERS))], axis=1)
+        return self._time_s(beyond & newest.usable)
+
+    def landed_s(self, samples: CarrySamples) -> float:
+        """How long links were on something while the open hand came down, the fingers' times added."""
+        if samples.motor_counts is None or np.isnan(samples.motor_counts).any():
+            return 0.0
+        speeds = _speeds(samples.joints_rad @ self._motors.from_joints.T, samples)
+        counts = _smooth(samples.motor_counts, 2 / 3 * _SMOOTHING)
+        off = np.abs(counts - np.median(counts, axis=0)) > _LANDED_COUNTS
+        return self._time_s(off & (np.abs(speeds) < _STILL_rad_s) & self._watched)
+
+    def _time_s(self, flags: NDArray[np.bool_]) -> float:
+        """How long a motor of each finger is flagged, for at least :data:`_PUSH_SAMPLES` in a row, added up."""
+        by_finger = np.stack([flags[:, self._finger == at].any(axis=1) for at in range(len(FINGERS))], axis=1)
         return float(_runs(by_finger).sum() * SAMPLE_ns / NANOSECONDS)
 
     def _closing(self, samples: CarrySamples, motor_counts: Array) -> _Closing:
         angles_rad = samples.joints_rad @ self._motors.from_joints.T
-        step_s = float(np.diff(samples.stamps_ns).mean()) / NANOSECONDS
-        speeds = np.gradient(_smooth(angles_rad, _SMOOTHING), step_s, axis=0)
-        terms = [np.ones_like(speeds), speeds, np.tanh(speeds / _STICTION_rad_s), np.gradient(speeds, step_s, axis=0)]
+        speeds = _speeds(angles_rad, samples)
+        changes = np.gradient(speeds, _step_s(samples), axis=0)
+        terms = [np.ones_like(speeds), speeds, np.tanh(speeds / _STICTION_rad_s), changes]
         loads_N = _smooth(tip_loads_N(samples, self._fingertips, self._side), 2 / 3 * _SMOOTHING)
         lower_rad, upper_rad = self._motors.limits_rad.T + _NEAR_END_rad * np.array([[1.0], [-1.0]])
         at_end = maximum_filter1d((angles_rad < lower_rad) | (angles_rad > upper_rad), _NEAR_END_SAMPLES, axis=0)
@@ -125,6 +142,14 @@ def _runs(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Only what is true at least :data:`_PUSH_SAMPLES` times in a row, along the first axis."""
     kept = minimum_filter1d(flags, _PUSH_SAMPLES, axis=0, mode="constant")
     return np.asarray(maximum_filter1d(kept, _PUSH_SAMPLES, axis=0, origin=-1))
+
+
+def _step_s(samples: CarrySamples) -> float:
+    return float(np.diff(samples.stamps_ns).mean()) / NANOSECONDS
+
+
+def _speeds(angles_rad: Array, samples: CarrySamples) -> Array:
+    return np.asarray(np.gradient(_smooth(angles_rad, _SMOOTHING), _step_s(samples), axis=0))
 
 
 def _smooth(values: Array, samples: float) -> Array:

@@ -13,6 +13,7 @@ from drivers.simulation.calibration import SimulatedCalibration
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.carrying.link_pushes import LinkPushes
+from sessions.perception.touch_capture import Measured
 
 MOTORS = SimulatedCalibration.from_package().motors
 COUNT, STEP_s = 200, 0.01
@@ -48,6 +49,12 @@ def closing(chance: np.random.Generator, *, start_rad: float = 0.3) -> CarrySamp
     counts = MOTORS.sign * counts + 2.0 * chance.standard_normal(counts.shape)
     stamps_ns = 1e9 * STEP_s * np.arange(COUNT)
     return CarrySamples(stamps_ns, joints_rad, np.tile(np.eye(4), (COUNT, 1, 1)), np.zeros((COUNT, 5, 6)), counts)
+
+
+def still(chance: np.random.Generator) -> CarrySamples:
+    """An open hand."""
+    joints_rad = np.tile(closing(chance).joints_rad[0], (COUNT, 1))
+    return replace(closing(chance), joints_rad=joints_rad, motor_counts=2.0 * chance.standard_normal((COUNT, 20)))
 
 
 def pushing(samples: CarrySamples, joint: str, counts: float = 40.0, during: slice = PUSH) -> CarrySamples:
@@ -109,6 +116,20 @@ def test_a_hand_that_does_not_report_its_motors_tells_nothing() -> None:
     assert LinkPushes(MOTORS, TIPS, "right").pushed_s(silent) == 0.0
 
 
+def test_a_link_that_lands_on_something_is_noticed_while_the_fingers_stand_still() -> None:
+    chance = np.random.default_rng(11)
+    standing = still(chance)
+    links = LinkPushes(MOTORS, TIPS, "right")
+    assert links.landed_s(standing) == 0.0
+    landed = pushing(standing, "MFJ3", 60.0, slice(90, 120))
+    assert links.landed_s(landed) == pytest.approx(0.3, abs=0.05)
+    assert links.landed_s(pushing(landed, "WRJ1", 400.0)) == pytest.approx(0.3, abs=0.05)
+
+
+def test_fingers_that_open_on_the_way_down_land_on_nothing() -> None:
+    assert LinkPushes(MOTORS, TIPS, "right").landed_s(closing(np.random.default_rng(12))) == 0.0
+
+
 def test_motors_that_scatter_more_hide_more() -> None:
     chance = np.random.default_rng(9)
     links = LinkPushes(MOTORS, TIPS, "right")
@@ -146,9 +167,30 @@ def test_a_push_widens_the_noise_of_the_step_that_it_ends() -> None:
     assert widened.rotation_rad > 2 * known.rotation_rad
 
 
-def _close(held: HeldObject, taken: CarrySamples, from_ns: int) -> None:
+def test_landings_of_all_tries_count_until_the_next_descent() -> None:
+    chance, known = np.random.default_rng(13), StepSigma(0.0004, np.radians(0.3))
+    landed, held = pushing(still(chance), "RFJ3", 60.0, slice(90, 120)), HeldObject(TIPS, "right", 1.0, MOTORS)
+    for number, taken in enumerate([landed, landed, still(chance)]):
+        held.on_tare(number * 10**10)
+        _watch(held, taken, number * 10**10)
+    held.on_close(3 * 10**10)
+    assert held.landed_s == pytest.approx(0.6, abs=0.1)
+    held.on_capture(4 * 10**10)
+    held.on_grasp(Measured(4 * 10**10, np.eye(4), (), ()))
+    widened = held.then_closed(known)
+    assert widened is not None
+    assert widened.translation_m == pytest.approx(np.hypot(0.0004, held.odometry.noise.landed_m_s * held.landed_s))
+    held.on_tare(5 * 10**10)
+    assert held.landed_s == 0.0
+
+
+def _watch(held: HeldObject, taken: CarrySamples, from_ns: int) -> None:
     assert taken.motor_counts is not None
-    held.on_close(from_ns)
     for n in range(COUNT):
         held.on_hand(from_ns + n * 10_000_000, taken.joints_rad[n], np.eye(4), taken.motor_counts[n])
+
+
+def _close(held: HeldObject, taken: CarrySamples, from_ns: int) -> None:
+    held.on_close(from_ns)
+    _watch(held, taken, from_ns)
     held.on_capture(from_ns + COUNT * 10_000_000)
