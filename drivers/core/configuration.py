@@ -36,8 +36,8 @@ class StrictModel(BaseModel):
     renamed: ClassVar[Mapping[str, str]] = {}
     """Keys by the names they had in the version before; they are still read, with a :class:`RenamedKeyWarning`."""
 
-    retired: ClassVar[tuple[str, ...]] = ()
-    """Keys that the version before had and that have no meaning any more; they are left out, with the same warning."""
+    retired: ClassVar[Mapping[str, str]] = {}
+    """Keys of the version before without a meaning now, with what took their place; left out with such a warning."""
 
     @model_validator(mode="before")
     @classmethod
@@ -52,10 +52,10 @@ class StrictModel(BaseModel):
                 raise ValueError(f"{key} is the former name of {new}: remove {key}")
             current[new] = current.pop(key)
             warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} is now called {new}"), stacklevel=2)
-        for key in cls.retired:
-            if key in current:
-                del current[key]
-                warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} no longer has any effect"), stacklevel=2)
+        for key, instead in cls.retired.items():
+            if current.pop(key, None) is not None:
+                words = f"{_reading.get()}{key} no longer has any effect: {instead}"
+                warnings.warn(RenamedKeyWarning(words), stacklevel=2)
         return current
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 import yaml
@@ -58,9 +60,9 @@ def test_both_names_at_once_are_refused_with_both(tmp_path: Path) -> None:
 
 def test_keys_without_a_meaning_any_more_are_left_out_and_told() -> None:
     class Newer(MotionNoise):
-        retired = ("wobble",)
+        retired: ClassVar[Mapping[str, str]] = {"wobble": "unheld takes its place"}
 
-    with pytest.warns(RenamedKeyWarning, match="test: wobble no longer has any effect"):
+    with pytest.warns(RenamedKeyWarning, match="test: wobble no longer has any effect: unheld takes its place"):
         assert validate({"wobble": 3, "unheld": 0.5}, Newer, where="test").unheld == 0.5
 
 

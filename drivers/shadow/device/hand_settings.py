@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -47,7 +48,7 @@ class HandSettings(StrictModel):
         reset_motors: reset the motor boards when connecting; they then need ``reset_wait_s`` to come back.
     """
 
-    retired: ClassVar[tuple[str, ...]] = ("lost_limit",)
+    retired: ClassVar[Mapping[str, str]] = {"lost_limit": "link_patience_s, in seconds, takes its place"}
 
     palm: PalmName = USUAL_PALM
     side: Side | None = None

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from io import BytesIO
 
+import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -30,13 +32,14 @@ def split_chunk(chunk: Chunk, is_wanted: Callable[[Channel], bool] | None = None
     """The messages and channels in a chunk, in their order; other records are left out.
 
     Args:
-        chunk: packed or not.
+        chunk: packed by zstd or LZ4, as other programs rewrite a recording, or not at all.
         is_wanted: tells of a channel that the chunk describes whether its messages are; None: all messages are.
 
     Raises:
         ValueError, McapError, zstandard.ZstdError, struct.error: the chunk is too large or damaged.
     """
     _check_size(chunk)
+    chunk = _without_lz4(chunk) if chunk.compression == "lz4" else chunk
     stream, size = get_chunk_data_stream(chunk, validate_crc=True)
     data = stream.read(size)
     records: list[McapRecord] = []
@@ -82,5 +85,16 @@ def _message(data: bytes, start: int, end: int) -> Message:
 def _check_size(chunk: Chunk) -> None:
     """No recorder writes larger chunks, and unpacking one needs no more memory. Raises ValueError."""
     packed = zstandard.frame_content_size(chunk.data) if chunk.compression == "zstd" else len(chunk.data)
-    if chunk.compression not in ("", "zstd") or max(chunk.uncompressed_size, packed) > LARGEST_CHUNK_bytes:
+    if chunk.compression not in ("", "zstd", "lz4") or max(chunk.uncompressed_size, packed) > LARGEST_CHUNK_bytes:
         raise ValueError(f"a chunk of {max(chunk.uncompressed_size, packed)} bytes, packed by {chunk.compression!r}")
+
+
+def _without_lz4(chunk: Chunk) -> Chunk:
+    """The chunk unpacked: its frame need not say how large it is, so that it may not grow beyond what the chunk says.
+    Raises ValueError.
+    """
+    try:
+        data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=chunk.uncompressed_size)
+    except (RuntimeError, EOFError) as error:
+        raise ValueError(f"LZ4: {error}") from error
+    return replace(chunk, compression="", data=data)

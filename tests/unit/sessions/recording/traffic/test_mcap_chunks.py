@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import replace
 
+import lz4.frame
 import pytest
 import zstandard
 from mcap.opcode import Opcode
@@ -29,7 +31,7 @@ UNKNOWN = record(0x7F, b"of a later version")
 
 
 def chunk(data: bytes, compression: str = "", crc: int | None = None, size: int | None = None) -> Chunk:
-    packed = zstandard.compress(data) if compression == "zstd" else data
+    packed = {"zstd": zstandard.compress, "lz4": lz4.frame.compress}.get(compression, bytes)(data)
     return Chunk(
         compression=compression,
         data=packed,
@@ -40,7 +42,7 @@ def chunk(data: bytes, compression: str = "", crc: int | None = None, size: int 
     )
 
 
-@pytest.mark.parametrize("compression", ["", "zstd"])
+@pytest.mark.parametrize("compression", ["", "zstd", "lz4"])
 def test_records_are_those_of_the_mcap_package(compression: str) -> None:
     whole = chunk(CHANNEL + FIRST + UNKNOWN + EMPTY, compression)
     assert split_chunk(whole) == breakup_chunk(whole, validate_crc=True)
@@ -66,7 +68,9 @@ def test_an_empty_chunk_has_no_records() -> None:
         (chunk(record(Opcode.MESSAGE, b"short")), ValueError),
         (chunk(record(Opcode.MESSAGE, FIRST, length=1 << 60)), ValueError),
         (chunk(b"", size=LARGEST_CHUNK_bytes + 1), ValueError),
-        (chunk(FIRST, compression="lz4"), ValueError),
+        (chunk(FIRST, compression="bz2"), ValueError),
+        (replace(chunk(FIRST), compression="lz4"), ValueError),  # no LZ4 frame
+        (chunk(bytes(1 << 20), compression="lz4", size=1000), CRCValidationError),  # larger than it says
     ],
 )
 def test_damaged_chunks_are_refused(damaged: Chunk, error: type[Exception]) -> None:
