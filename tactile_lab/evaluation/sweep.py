@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
+from tactile_lab.evaluation.consistency.levels import LEVELS
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
 from tactile_lab.evaluation.spread import Spread
 
@@ -63,11 +64,11 @@ class SweepRow:
         run = {"object": self.run.object_name, "dimension": self.run.dimension, "seed": self.run.seed}
         return {**run, "failure": self.failure or None, "evaluation": self.evaluation}
 
-    def figure(self, *keys: str) -> float | None:
-        """A metric of the evaluation by its keys, None if it is unknown."""
+    def figure(self, *keys: str | int) -> float | None:
+        """A metric of the evaluation by its keys, a number being a place in a list; None if it is unknown."""
         value: Any = self.evaluation
         for key in keys:
-            value = value.get(key) if isinstance(value, Mapping) else None
+            value = value[key] if isinstance(key, int) and value else value.get(key) if value else None
         return None if value is None else float(value)
 
 
@@ -78,8 +79,10 @@ COLUMNS = (
     ("position RMSE, mm", ("pose", "rmse_mm"), 1),
     ("rotation RMSE, °", ("pose", "rmse_deg"), 1),
     ("registration, mm", ("registration_rms_mm",), 1),
+    ("signed distance, mm", ("consistency", "surface", "signed_mm"), 2),
+    ("share inside its 95 %", ("consistency", "surface", "inside", LEVELS.index(0.95)), 2),
 )
-"""Metrics of a summary: heading, keys in ``evaluation.json``, decimals."""
+"""Metrics of a summary: heading, keys in ``evaluation.json``, decimals. A signed distance is positive outside."""
 
 
 @dataclass(frozen=True)

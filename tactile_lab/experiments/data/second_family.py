@@ -31,6 +31,9 @@ OWN_SIGMA_m, PALM_SIGMA_m = POINT_SIGMA_m * np.sqrt([1.0 - _COMMON_SHARE, _COMMO
 _BIAS_m = 0.0002
 """How much deeper all contacts of a session lie than the surface."""
 
+_BIAS_COVARIANCE_m2 = _BIAS_m**2 * np.eye(3)
+"""What contacts state of it: what all touches of a finger share, as after a calibration that is good to so much."""
+
 _CONTACT_FREEDOM, _SLIP_FREEDOM = 4.0, 6.0
 """Degrees of freedom of Student's t distribution, scaled to the stated standard deviation."""
 
@@ -220,7 +223,9 @@ class _Hand:
         normal = normal + self._noisy * NORMAL_SIGMA_rad * self._heavy(_CONTACT_FREEDOM, 3)
         if rng.random() < self._wrong_share:
             point, normal = point + self._noisy * rng.normal(0.0, _WRONG_m, 3), self._noisy * rng.normal(size=3)
-        return Contact(finger, point, _unit(normal), OWN_SIGMA_m**2 * np.eye(3), NORMAL_SIGMA_rad, _FORCE_N)
+        covariance_m2 = OWN_SIGMA_m**2 * np.eye(3) + _BIAS_COVARIANCE_m2
+        given = finger, point, _unit(normal), covariance_m2, NORMAL_SIGMA_rad, _FORCE_N
+        return Contact(*given, shared_covariance_m2=_BIAS_COVARIANCE_m2)
 
     def _heavy(self, freedom: float, count: int) -> Array:
         """Numbers of Student's t distribution, of variance 1."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.shape.planar.cut_corners import CutCorner
 from tactile_lab.slam.shape.planar.segmentation import Faces, PlanarContacts
 from tactile_lab.slam.shape.planar.uncertainty import FaceUncertainty
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
@@ -38,6 +39,9 @@ _LONGEST_DETOUR = 4.0
 
 _BRIDGE_STEPS = 8
 
+_BRIDGE_SLOPE = 0.5
+"""Standard deviation of the direction in which a provisional outline leaves a face: there may be a corner at once."""
+
 
 @dataclass(frozen=True)
 class Joint:
@@ -46,10 +50,12 @@ class Joint:
     Attributes:
         points_m: one corner, or a bridge from one end to the other, shape (k, 2).
         sigma_m: standard deviation across the outline at each point of a bridge, shape (k,); NaN at a corner.
+        cut: what may be hidden at a corner; None for a bridge.
     """
 
     points_m: Array
     sigma_m: Array
+    cut: CutCorner | None = None
 
 
 class JointMaker:
@@ -71,11 +77,10 @@ class JointMaker:
         """The joint after ``face``."""
         before, after = self._faces.members(face), self._faces.members(following)
         corner = self._intersection(face, following)
-        if corner is not None and any(
-            self._is_plausible(face, following, corner, int(last), int(first))
-            for last, first in _outermost(before, after)
-        ):
-            return Joint(corner[None], np.full(1, np.nan))
+        for last, first in _outermost(before, after) if corner is not None else ():
+            ends = self._ends(face, following, int(last), int(first))
+            if self._is_plausible(face, following, corner, ends, [last, first]):
+                return Joint(corner[None], np.full(1, np.nan), self._cut(face, following, corner, ends))
         return self._bridge(self._ends(face, following, int(before[-1]), int(after[0])))
 
     def _ends(self, face: int, following: int, last: int, first: int) -> Array:
@@ -94,11 +99,20 @@ class JointMaker:
             return None
         return np.asarray(np.linalg.solve(normals, self._faces.offsets_m[pair]))
 
-    def _is_plausible(self, face: int, following: int, corner: Array, last: int, first: int) -> bool:
+    def _leaps_m(self, face: int, following: int, corner: Array, ends: Array) -> Array:
+        """How far the corner lies beyond the last contact of one face and before the first of the next, shape (2,)."""
+        tangents = self._faces.tangents
+        return np.array([(corner - ends[0]) @ tangents[face], (ends[1] - corner) @ tangents[following]])
+
+    def _cut(self, face: int, following: int, corner: Array, ends: Array) -> CutCorner:
+        """What may be hidden at a corner, nothing on the side of a face whose contacts reach it."""
+        beyond = self._leaps_m(face, following, corner, ends)[:, None] > 0
+        return CutCorner.of(corner, np.where(beyond, ends, corner), self._contacts_per_m)
+
+    def _is_plausible(self, face: int, following: int, corner: Array, ends: Array, outermost: list[np.int64]) -> bool:
         """Whether the corner lies between both faces, cuts off no contacts, and is well determined."""
-        ends, tangents = self._ends(face, following, last, first), self._faces.tangents
-        slack_m = _SLACK_SIGMAS * float(self._contacts.point_sigma_m[[last, first]].max())
-        leaps = np.array([(corner - ends[0]) @ tangents[face], (ends[1] - corner) @ tangents[following]])
+        slack_m = _SLACK_SIGMAS * float(self._contacts.point_sigma_m[outermost].max())
+        leaps = self._leaps_m(face, following, corner, ends)
         if leaps.min() < -slack_m:
             return False
         unseen = self._contacts_per_m * (np.abs(leaps).sum() - float(np.linalg.norm(ends[1] - ends[0])))
@@ -120,7 +134,8 @@ class JointMaker:
         length = float(np.linalg.norm(ends[1] - ends[0]))
         piece = self._piece_of_provisional(ends, _LONGEST_DETOUR * length)
         if piece is not None:
-            return Joint(np.vstack([ends[:1], piece.points_m, ends[1:]]), np.array([base, *piece.sigma_m, base]))
+            points_m = np.vstack([ends[:1], piece.points_m, ends[1:]])
+            return Joint(points_m, np.hypot([base, *piece.sigma_m, base], _BRIDGE_SLOPE * _to_nearest_end_m(points_m)))
         share = np.linspace(0.0, 1.0, _BRIDGE_STEPS + 1)
         return Joint(ends[0] + share[:, None] * (ends[1] - ends[0]), base + length * share * (1 - share))
 
@@ -135,6 +150,12 @@ class JointMaker:
         if len(indices) == 0 or length > longest_m:
             return None
         return Contour(points[indices], self._provisional.sigma_m[indices], is_closed=False)
+
+
+def _to_nearest_end_m(line_m: Array) -> Array:
+    """The way along a line from each point to the nearer end, shape (k,)."""
+    way_m = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1)))
+    return np.minimum(way_m, way_m[-1] - way_m)
 
 
 def _outermost(before: Indices, after: Indices) -> list[tuple[np.int64, np.int64]]:

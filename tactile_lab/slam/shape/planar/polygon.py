@@ -35,6 +35,7 @@ class Polygon:
             of bridges where two neighbouring faces do not meet in a plausible corner.
         vertex_sigma_m: standard deviation across the outline at the points of bridges, NaN at corners, shape (k,).
         edge_faces: face of the edge from each vertex to the next, or :data:`BRIDGE`, shape (k,).
+        cuts: of each vertex, what may be hidden there; None at points of bridges.
     """
 
     name = "polygon"
@@ -47,6 +48,7 @@ class Polygon:
         self.vertex_sigma_m = np.concatenate([joint.sigma_m for joint in joints])
         following = [[BRIDGE] * (len(joint.points_m) - 1) + [(i + 1) % len(joints)] for i, joint in enumerate(joints)]
         self.edge_faces = np.concatenate(following).astype(np.int64)
+        self.cuts = [joint.cut for joint in joints for _ in joint.points_m]
 
     @classmethod
     def of(
@@ -104,7 +106,9 @@ class Polygon:
         return np.asarray(self.outline_m[self._is_corner])
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
-        """The outline with every corner; sigma across it from the covariance of the faces, or of the bridges."""
+        """The outline with every corner; sigma across it from the covariance of the faces and what may be hidden at
+        corners, or of the bridges.
+        """
         points, sigmas = [], []
         ends, end_sigmas = np.roll(self.outline_m, -1, axis=0), np.roll(self.vertex_sigma_m, -1)
         for i, (start, end, face) in enumerate(zip(self.outline_m, ends, self.edge_faces, strict=True)):
@@ -115,8 +119,17 @@ class Polygon:
             if face == BRIDGE:
                 sigmas.append((1 - share) * self.vertex_sigma_m[i] + share * end_sigmas[i])
             else:
-                sigmas.append(np.sqrt(self.uncertainty.variance_m2(face, places)))
+                sigmas.append(np.sqrt(self.uncertainty.variance_m2(face, places) + self._hidden_m2(i, places)))
         return Contour(np.vstack(points), np.concatenate(sigmas), is_closed=True)
+
+    def _hidden_m2(self, edge: int, places_m: Array) -> Array:
+        """Mean square distance of places on an edge, shape (q, 2), from what may be hidden at its two corners."""
+        hidden_m2 = np.zeros(len(places_m))
+        for vertex in (edge, (edge + 1) % len(self.cuts)):
+            if (cut := self.cuts[vertex]) is not None:
+                away_m = np.linalg.norm(places_m - self.outline_m[vertex], axis=1)
+                hidden_m2 += cut.variance_m2(away_m, after=vertex == edge)
+        return hidden_m2
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
         """Raises ShapeError: an outline has no surface."""

@@ -19,6 +19,7 @@ def evaluation(hausdorff_mm: float, *, status: str = "ok", failed: bool | None =
         "shape_best_fit": figures,
         "pose": {"rmse_mm": 2.0, "rmse_deg": 1.0},
         "registration_rms_mm": 1.5,
+        "consistency": {"surface": {"signed_mm": -0.04, "inside": [0.5, 0.7, 0.93]}},
     }
 
 
@@ -62,4 +63,5 @@ def test_markdown_shows_failed_runs_with_seed_and_reason_and_counts_their_figure
     assert len({line.count(" | ") for line in lines}) == 1
     assert "| box | 2 | 3 | 5.0 / 33.8 / 41.0 | 4.0 / 32.8 / 40.0 |" in lines[2]
     assert lines[2].endswith("| 1 | 3: registration above 5 mm |")
+    assert "| -0.04 / -0.04 / -0.04 | 0.93 / 0.93 / 0.93 |" in lines[2]
     assert "no \\| contact at all" in lines[3]
