@@ -13,6 +13,7 @@ from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
+from sessions.perception.carrying.lifted import lifted_motions, raised
 from sessions.perception.carrying.planar_motions import displacement, planar_matrices
 from sessions.perception.carrying.roundness import Roundness
 from sessions.perception.carrying.tilt import tilt_rad
@@ -190,7 +191,10 @@ class CarryOdometry:
         balance, usual = Balance.of(steps), self.friction
         best = balance.solve([usual], _ITERATIONS)[0]
         others = balance.solve(_other_assumptions(usual, self.measured), _ITERATIONS_OF_OTHERS, best)
-        motions = compose_steps(np.concatenate([best[None], others]), balance.centres_m)
+        answers = np.concatenate([best[None], others])
+        if (up := raised(steps)).any():
+            answers[:, up] = lifted_motions(steps, up, balance.centres_m, usual)
+        motions = compose_steps(answers, balance.centres_m)
         palm = planar_matrices(steps.world_T_palm[[0, -1]])[0]
         middle = balance.centres_m[0]
         ends = np.array([displacement(motion, middle) for motion in motions])
