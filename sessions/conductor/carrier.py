@@ -39,11 +39,11 @@ class Carrier:
             last: no grasp follows.
         """
         self._roles.supervisor.count_contacts(len(grasp.contacts))
-        hand_motion = Pose3()
-        if weighed and holds(grasp.touching):
-            self._weigh(grasp.touching)
+        hand_motion, is_held = Pose3(), holds(grasp.touching)
+        if weighed and is_held:
+            is_held = self._weigh(grasp.touching)
             hand_motion = self._told_carry() or hand_motion
-        if wanted.moves and holds(grasp.touching) and not last:
+        if wanted.moves and is_held and not last:
             hand_motion = self._reorient(grasp, wanted)
         self._roles.decisions.on_carry(hand_motion)
 
@@ -70,17 +70,18 @@ class Carrier:
         if words := forecast.in_words():
             self._tell(Level.WARNING, f"the object {words}")
 
-    def _weigh(self, touching: frozenset[str]) -> None:
-        """Weigh the held object, if this session can and nobody objects."""
+    def _weigh(self, touching: frozenset[str]) -> bool:
+        """Weigh the held object, if this session can and nobody objects. Returns whether it is still held."""
         roles = self._roles
         if roles.weigh is None:
-            return
+            return True
         if not roles.decisions.may_weigh(roles.performer.plan):
             self._tell(Level.INFO, "the object is not weighed")
-            return
+            return True
         self._phase("weigh")
         end = roles.weigh(touching)
         self._tell(Level.INFO, f"weighed: {end}; {self._runtime.perception.properties.in_words()}")
+        return end.is_held
 
     def _told_carry(self) -> Pose3 | None:
         """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""

@@ -290,13 +290,16 @@ class GraspCycle:
 
     def weigh(self, touching: frozenset[str]) -> LiftEnd:
         """Drag, lift and set down the object that these fingers hold; the runtime's perception knows what was found."""
+        unit_N = max(self.fingers.balanced_forces_N(touching, 1.0).values())
         grip = Grip(
             hold=lambda force_N: self.fingers.servo_forces(self.fingers.balanced_forces_N(touching, force_N)),
+            share_pressed=lambda share: share * self.settings.pressed_N / unit_N,
             holding=lambda: frozenset(self.fingers.pressed(_LEAST_HOLD_N)),
             is_pressed=lambda: bool(self.fingers.pressed(self.settings.pressed_N)),
         )
         end = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
-        self.fingers.ease(touching, self.settings.weighing.squeeze_N)
+        if end.is_held:
+            self.fingers.ease(touching, self.settings.weighing.squeeze_N)
         self._motion.runtime.end_hold()
         return end
 

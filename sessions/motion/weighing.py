@@ -2,7 +2,8 @@
 
 The table's friction pulls the other way when the hand turns round: half the difference is the friction, without what
 the fingers do to each other. The lifted object is moved to and fro as well. What hangs free does not mind; what still
-stands on the table with an edge is held back, and its weight is not all in the fingers.
+stands on the table with an edge is held back, and its weight is not all in the fingers: then the hand holds it as
+firmly as it may, and lifts it higher.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -20,6 +22,11 @@ from drivers.shadow.closing.closing import Closing
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import holds
 from sessions.motion.motion import Motion
+from sessions.perception.weighing.weighing import Hanging
+
+_BACK_m, _JERK = 0.003, 2
+_FIRMER = 1.25
+"""Held by a force only so much larger, the object would slip out instead of being lifted."""
 
 
 class WeighingSettings(StrictModel):
@@ -28,7 +35,10 @@ class WeighingSettings(StrictModel):
     Attributes:
         squeeze_N: force of each finger while the object hangs; the thumb holds against their sum.
         squeeze_s: time to build it up.
-        lift_m, lift_m_s: how far and how fast.
+        firm_share: what does not hang free is held so firmly that the fingertip that presses most does so with this
+            share of ``cycle.pressed_N``, for the next lift.
+        lifts_m, lift_m_s: how far, one after the other until it hangs free, and how fast.
+        lower_m_s: how fast it is set down; what leans lands on an edge, and is turned between the fingers.
         most_N: upward force at which the hand lifts no further, and sets the object down again.
         drag_m: how far to each side the object is dragged.
         shift_m, shift_m_s: how far to each side it is moved while it hangs; how fast it is moved and dragged.
@@ -38,8 +48,10 @@ class WeighingSettings(StrictModel):
 
     squeeze_N: float = Field(default=0.8, gt=0.0)
     squeeze_s: float = Field(default=0.5, gt=0.0)
-    lift_m: float = Field(default=0.015, gt=0.0, le=0.05)
+    firm_share: float = Field(default=0.9, gt=0.0, le=1.0)
+    lifts_m: tuple[Annotated[float, Field(gt=0.0, le=0.05)], ...] = Field(default=(0.015, 0.025), min_length=1)
     lift_m_s: float = Field(default=0.04, gt=0.0, le=0.05)
+    lower_m_s: float = Field(default=0.010, gt=0.0, le=0.05)
     most_N: float = Field(default=8.0, gt=0.0)
     drag_m: float = Field(default=0.006, gt=0.0, le=0.02)
     shift_m: float = Field(default=0.003, gt=0.0, le=0.01)
@@ -52,9 +64,16 @@ class LiftEnd(StrEnum):
     """How a lift ended, in words."""
 
     HUNG = "it was lifted and set down again"
+    HELD = "it was lifted, but stood on an edge, or links of the fingers carried a part of it"
     HEAVY = "it is too heavy: the upward force reached its limit"
     LOST = "it slipped out of the fingers"
     PRESSED = "a fingertip was pressed hard"
+    ABOVE = "it was lifted, but a fingertip came down on it when it was set down"
+
+    @property
+    def is_held(self) -> bool:
+        """Whether the fingers still hold the object where they grasped it."""
+        return self not in (LiftEnd.LOST, LiftEnd.ABOVE)
 
 
 @dataclass(frozen=True)
@@ -63,11 +82,14 @@ class Grip:
 
     Attributes:
         hold: one cycle of it, to this force of each finger, N.
+        share_pressed: the force of each finger with which the fingertip that presses most does so with this share of
+            the force that counts as pressed hard.
         holding: the fingertips that press the object.
         is_pressed: whether one is pressed hard.
     """
 
     hold: Callable[[float], None]
+    share_pressed: Callable[[float], float]
     holding: Callable[[], frozenset[str]]
     is_pressed: Callable[[], bool]
 
@@ -83,9 +105,13 @@ class Weigher:
 
     def __init__(self, motion: Motion, settings: WeighingSettings, grip: Grip) -> None:
         self._motion, self._settings, self._grip = motion, settings, grip
+        self._squeeze_N = settings.squeeze_N
 
     def weigh(self, frame: GraspFrame, table: Closing) -> LiftEnd:
-        """Drag and lift the object held at a grasp frame, and set it down where it was."""
+        """Drag and lift the object held at a grasp frame, and set it down where it was.
+
+        An object that slipped out is not there any more: the hand stays where it lost it.
+        """
         s, runtime = self._settings, self._motion.runtime
 
         def raised(height_m: float, aside_m: float = 0.0) -> Array:
@@ -93,22 +119,49 @@ class Weigher:
 
         self._rest(s.squeeze_s)
         runtime.begin_hold()
-        end = self._move_to_and_fro(raised, (0.0, s.drag_m), runtime.begin_dragging, runtime.end_dragging)
+        end, _ = self._move_to_and_fro(raised, (0.0, s.drag_m), runtime.begin_dragging, runtime.end_dragging)
         if end is LiftEnd.HUNG:
             end = self._lift(raised)
-        self._rest(s.rest_s)
         return end
 
     def _lift(self, raised: Callable[..., Array]) -> LiftEnd:
-        """Up, to and fro, and down again, as far as the object lets it."""
-        s, runtime = self._settings, self._motion.runtime
-        share, end = self._follow(lambda share: raised(share * s.lift_m), s.lift_m / s.lift_m_s)
-        if end is LiftEnd.HUNG:
-            self._rest(s.rest_s)
-            end = self._move_to_and_fro(raised, (s.lift_m, s.shift_m), runtime.begin_hanging, runtime.end_hanging)
-        height_m = share * s.lift_m
-        self._motion.follow(lambda share: raised((1 - share) * height_m), s.lift_m / s.lift_m_s, self._keep)
+        """Up and down again; once more, firmer and higher, if it did not hang free and the fingers may press more."""
+        s, end = self._settings, LiftEnd.HELD
+        for height_m in s.lifts_m:
+            share, end = self._follow(lambda share: raised(share * height_m), height_m / s.lift_m_s)  # noqa: B023
+            if end is LiftEnd.HUNG:
+                end = self._hang(raised, height_m)
+            if end is not LiftEnd.LOST and not self._set_down(raised, share * height_m):
+                end = LiftEnd.ABOVE
+            firm_N = self._grip.share_pressed(s.firm_share)
+            if end is not LiftEnd.HELD or firm_N < _FIRMER * s.squeeze_N:
+                break
+            self._squeeze_N = firm_N
+            self._rest(s.squeeze_s)
         return end
+
+    def _hang(self, raised: Callable[..., Array], height_m: float) -> LiftEnd:
+        """To and fro; :attr:`LiftEnd.HELD` if something but the fingertips holds the object."""
+        runtime = self._motion.runtime
+        self._rest(self._settings.rest_s)
+        where_m = height_m, self._settings.shift_m
+        end, found = self._move_to_and_fro(raised, where_m, runtime.begin_hanging, runtime.end_hanging)
+        return LiftEnd.HELD if isinstance(found, Hanging) and not found.is_free else end
+
+    def _set_down(self, raised: Callable[..., Array], height_m: float) -> bool:
+        """Down again; a little back if a fingertip is pressed: one that has slid up comes down on the object.
+
+        Returns:
+            Whether the hand is down.
+        """
+        s, self._squeeze_N = self._settings, self._settings.squeeze_N
+        duration_s = height_m / s.lower_m_s
+        share, end = self._follow(lambda share: raised((1 - share) * height_m), duration_s, LiftEnd.PRESSED, _JERK)
+        if end is LiftEnd.PRESSED:
+            at_m = (1 - share) * height_m
+            self._motion.follow(lambda share: raised(at_m + share * _BACK_m), _BACK_m / s.lift_m_s, self._keep)
+        self._rest(s.rest_s)
+        return end is LiftEnd.HUNG
 
     def _move_to_and_fro(
         self,
@@ -116,7 +169,7 @@ class Weigher:
         where_m: tuple[float, float],
         begin: Callable[[], object],
         complete: Callable[[], object],
-    ) -> LiftEnd:
+    ) -> tuple[LiftEnd, object]:
         """To one side, to the other and back; what the fingertips feel meanwhile is measured.
 
         The hand moves across the direction in which the thumb holds against the fingers: along it, their forces would
@@ -126,26 +179,36 @@ class Weigher:
             raised: positioner joints at a height and a distance aside.
             where_m: the height, and how far to each side.
             begin, complete: start and end the measurement in the runtime.
+
+        Returns:
+            How it ended, and what ``complete`` returned.
         """
         height_m, far_m = where_m
         begin()
         duration_s = 4 * far_m / self._settings.shift_m_s
         _, end = self._follow(lambda share: raised(height_m, _to_and_fro(share) * far_m), duration_s)
-        if end is LiftEnd.HUNG:
-            complete()
-        return end
+        return end, complete() if end is LiftEnd.HUNG else None
 
-    def _follow(self, pose_at: Callable[[float], Array], duration_s: float) -> tuple[float, LiftEnd]:
-        """Follow a path until its end, or until the object must be set down again."""
-        ended, in_a_row = LiftEnd.HUNG, 0
+    def _follow(
+        self,
+        pose_at: Callable[[float], Array],
+        duration_s: float,
+        only: LiftEnd | None = None,
+        patience: int | None = None,
+    ) -> tuple[float, LiftEnd]:
+        """Follow a path until its end, or until there is an objection: only ``only``, and for more than ``patience``
+        cycles, where they are given.
+        """
+        most, ended, in_a_row = self._settings.patience if patience is None else patience, LiftEnd.HUNG, 0
 
         def go_on() -> bool:
             nonlocal ended, in_a_row
             self._keep()
             objection = self._objection()
+            objection = objection if only in (None, objection) else None
             in_a_row = 0 if objection is None else in_a_row + 1
-            if objection is not None and in_a_row > self._settings.patience:
-                ended = objection
+            if in_a_row > most:
+                ended = objection or ended
             return ended is LiftEnd.HUNG
 
         share = self._motion.follow(pose_at, duration_s, go_on)
@@ -159,7 +222,7 @@ class Weigher:
         return LiftEnd.HEAVY if self._motion.runtime.perception.held_N() > self._settings.most_N else None
 
     def _keep(self) -> bool:
-        self._grip.hold(self._settings.squeeze_N)
+        self._grip.hold(self._squeeze_N)
         return True
 
     def _rest(self, duration_s: float) -> None:

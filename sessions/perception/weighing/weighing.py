@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from drivers.core.contacts import Array
 from drivers.core.fingertip import ContinuousFingertip
@@ -23,6 +24,12 @@ _HELD_BACK_N, _HELD_BACK_SHARE = 0.02, 0.025
 """By how much an object that hangs free seems to be held back: noise, and what inertia and creep make of its weight.
 Errors of the joint angles are the same both ways, and cancel.
 """
+_UNSTEADY_N, _UNSTEADY_SHARE = 0.02, 0.01
+"""By how much the upward force on an object that hangs free varies; an edge on the table slips and catches."""
+_SIDEWAYS_SIGMAS = 4.0
+"""A force along the table that is larger than this, in standard deviations, is no error of the joint angles."""
+_SMOOTHING = 1.0
+"""Samples; of the upward force, against noise."""
 _SLIDING_QUANTILE = 0.6
 """The dragged object lags behind when the hand turns round: the stronger pulls are those at which it slides."""
 _SPEED_SHARE = 0.5
@@ -38,6 +45,9 @@ class Hanging:
         centre_m: of mass, world x and y, shape (2,), where it hung.
         centre_sigma_m: standard deviations, shape (2,).
         held_back_N: by how much something held the shifted object back: friction of an edge that stood on the table.
+        unsteady_N: standard deviation of the upward force in time.
+        sideways_sigmas: force of the fingertips along the table, in its standard deviations: as large as that of links,
+            which feel nothing, against the object.
     """
 
     weight_N: float
@@ -45,12 +55,24 @@ class Hanging:
     centre_m: Array
     centre_sigma_m: Array
     held_back_N: float
+    unsteady_N: float = 0.0
+    sideways_sigmas: float = 0.0
+
+    @property
+    def stands(self) -> bool:
+        """Whether the table carries a part of it."""
+        held_back = self.held_back_N > _HELD_BACK_N + _HELD_BACK_SHARE * self.weight_N
+        return held_back or self.unsteady_N > _UNSTEADY_N + _UNSTEADY_SHARE * self.weight_N
+
+    @property
+    def is_leaned_on(self) -> bool:
+        """Whether links of the fingers carry a part of it."""
+        return self.sideways_sigmas > _SIDEWAYS_SIGMAS
 
     @property
     def is_free(self) -> bool:
-        """Whether nothing but the fingers held it."""
-        most_N = _HELD_BACK_N + _HELD_BACK_SHARE * self.weight_N
-        return self.weight_N > _LEAST_WEIGHT_N and self.held_back_N < most_N
+        """Whether nothing but the fingertips held it."""
+        return self.weight_N > _LEAST_WEIGHT_N and not (self.stands or self.is_leaned_on)
 
 
 @dataclass(frozen=True)
@@ -84,23 +106,24 @@ def hanging(
         height_m: of the contacts above the table: forces there that do not cancel make moments.
     """
     found = net_wrench(samples, fingertips, side)
-    best = _weight_and_centre(found, height_m)
+    best = _measured(found, height_m)
     turned = np.eye(len(JOINTS)) * joint_sigma_rad
     others = [
-        _weight_and_centre(net_wrench(samples, {finger: tip}, side, turn), height_m, found, finger_alone)
+        _measured(net_wrench(samples, {finger: tip}, side, turn), height_m, found, finger_alone)
         for finger, tip in fingertips.items()
         for finger_alone in [net_wrench(samples, {finger: tip}, side)]
         for turn in turned[[name.startswith(finger) for name in JOINTS]]
     ]
     spread = np.square(np.array(others) - best).sum(axis=0)
-    drift = _drift(fingertips, best[0])
-    sigma = np.sqrt(spread + drift**2)
+    sigma = np.sqrt(spread + _drift(fingertips, best[0]) ** 2)
     return Hanging(
         weight_N=float(best[0]),
         weight_sigma_N=float(np.hypot(sigma[0], _GAIN * best[0])),
-        centre_m=best[1:],
-        centre_sigma_m=sigma[1:],
+        centre_m=best[1:3],
+        centre_sigma_m=sigma[1:3],
         held_back_N=abs(_held_back_N(found)),
+        unsteady_N=float(gaussian_filter1d(found.force_N[:, 2], _SMOOTHING, mode="nearest").std()),
+        sideways_sigmas=float(np.linalg.norm(best[3:] / sigma[3:])),
     )
 
 
@@ -111,10 +134,12 @@ def dragging(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip
     return Dragging(friction_N, float(np.hypot(_DRAG_N, _DRAG_SHARE * friction_N)), -float(found.force_N[:, 2].mean()))
 
 
-def _weight_and_centre(
+def _measured(
     wrench: NetWrench, height_m: float, whole: NetWrench | None = None, instead_of: NetWrench | None = None
 ) -> Array:
-    """Weight (N) and centre (m, m), shape (3,); of ``whole`` with one part of it replaced by ``wrench``."""
+    """Weight (N), centre (m, m) and force along the table (N, N), shape (5,); of ``whole`` with one part of it replaced
+    by ``wrench``.
+    """
     force, moment = wrench.force_N.mean(axis=0), wrench.moment_Nm.mean(axis=0)
     if whole is not None and instead_of is not None:
         force = force + (whole.force_N - instead_of.force_N).mean(axis=0)
@@ -123,15 +148,15 @@ def _weight_and_centre(
     below_m, weight_N = height_m - palm[2], max(float(force[2]), _LEAST_WEIGHT_N)
     x = (below_m * force[0] - moment[1]) / weight_N
     y = (below_m * force[1] + moment[0]) / weight_N
-    return np.array([force[2], palm[0] + x, palm[1] + y])
+    return np.array([force[2], palm[0] + x, palm[1] + y, force[0], force[1]])
 
 
 def _drift(fingertips: Mapping[str, ContinuousFingertip], weight_N: float) -> Array:
-    """Standard deviations of weight and centre by the drift of the sensors since their tare, shape (3,)."""
+    """Standard deviations by the drift of the sensors since their tare; shape and order of :func:`_measured`."""
     drifts = np.array([tip.drift for tip in fingertips.values()]).reshape(-1, 6)
     force_N, moment_Nm = (float(np.sqrt(np.square(drifts[:, part]).sum() / 3)) for part in (slice(0, 3), slice(3, 6)))
     lever_m = (moment_Nm + 0.1 * force_N) / max(weight_N, _LEAST_WEIGHT_N)
-    return np.array([force_N, lever_m, lever_m])
+    return np.array([force_N, lever_m, lever_m, force_N, force_N])
 
 
 def _held_back_N(wrench: NetWrench, quantile: float = 0.5) -> float:

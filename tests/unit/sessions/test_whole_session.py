@@ -64,7 +64,7 @@ class Recorded:
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
     folder, heard = tmp_path_factory.mktemp("whole"), Heard()
     wanted = {"weighings": 1, "exploration": {"policy": None}}
-    rig = low_rig(folder, {"conductor": wanted})
+    rig = low_rig(folder, {"conductor": wanted, "simulation": {"object_mass_kg": 0.15}})
     request = SessionRequest(str(rig), "box-10x6x4", folder / "sessions", method="odometry", seed=3, grasps=2)
     finished = run_session(request, heard)
     assert finished.outcome is not None

@@ -24,7 +24,9 @@ SLIPPERY = Forecast(force_N=1.5, slip_m=0.012, slip_rad=0.2, leans=True)
 class Bench:
     """A carrier with roles that only note what is asked of them."""
 
-    def __init__(self, forecast=FIRM, touching=HELD, may_weigh=True, carry=None, jammed=(), can_weigh=True):
+    def __init__(
+        self, forecast=FIRM, touching=HELD, may_weigh=True, carry=None, jammed=(), can_weigh=True, end=LiftEnd.HUNG
+    ):
         self.done, self.told, self.logged, self.motions = [], [], [], []
         cycle = SimpleNamespace(
             plan=None,
@@ -37,7 +39,7 @@ class Bench:
             supervisor=SimpleNamespace(count_contacts=lambda count: None),
             performer=cycle,
             decisions=decisions,
-            weigh=(lambda touching: self.done.append("weigh") or LiftEnd.HUNG) if can_weigh else None,
+            weigh=(lambda touching: self.done.append("weigh") or end) if can_weigh else None,
             foretell=lambda grasp, turn, shift: self.done.append("foretell") or forecast,
         )
         properties = SimpleNamespace(in_words=lambda: "mass 300 g")
@@ -108,6 +110,12 @@ def test_how_the_object_moved_is_what_the_fingertips_felt(remarkable, told):
 def test_a_re_orientation_that_fingers_stopped_is_told():
     (told,) = Bench(jammed=("FF", "TH")).carry().told
     assert told == (Level.WARNING, "FF, TH pressed hard: re-orientation stopped early")
+
+
+def test_what_is_not_held_any_more_when_it_was_weighed_is_not_carried():
+    assert "squeeze" not in Bench(end=LiftEnd.LOST).carry(weighed=True).done
+    assert "squeeze" not in Bench(end=LiftEnd.ABOVE).carry(weighed=True).done
+    assert "squeeze" in Bench(end=LiftEnd.HELD).carry(weighed=True).done
 
 
 def test_a_weighing_says_how_it_ended_and_what_it_found():

@@ -9,17 +9,28 @@ import pytest
 
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.weighing import Grip, LiftEnd, Weigher, WeighingSettings
+from sessions.perception.weighing.weighing import Hanging
 
 ALL = frozenset({"FF", "MF", "TH"})
+LIFTS_m = WeighingSettings().lifts_m
+
+
+def hanging(held_back_N):
+    return Hanging(2.0, 0.05, np.zeros(2), np.full(2, 0.001), held_back_N)
+
+
+FREE, STANDS = hanging(0.01), hanging(0.2)
 
 
 class RecordingMotion:
     """Keeps the heights and what is told to the runtime."""
 
-    def __init__(self, held_N=3.0):
-        told = self.told = []
+    def __init__(self, held_N=3.0, hangings=(FREE,)):
+        told, found = [], iter(hangings)
+        self.told = told
         names = ("begin_hold", "begin_dragging", "end_dragging", "begin_hanging", "end_hanging")
         verbs = {name: lambda name=name: told.append(name) for name in names}
+        verbs["end_hanging"] = lambda: told.append("end_hanging") or next(found)
         self.runtime = SimpleNamespace(perception=SimpleNamespace(held_N=lambda: held_N), **verbs)
         self.heights_m = []
 
@@ -42,8 +53,8 @@ class RecordingMotion:
         return made
 
 
-def weigh(motion, holding=lambda: ALL, is_pressed=lambda: False):
-    grip = Grip(lambda force_N: None, holding, is_pressed)
+def weigh(motion, holding=lambda: ALL, is_pressed=lambda: False, hold=lambda force_N: None):
+    grip = Grip(hold, lambda share: 2.0 * share, holding, is_pressed)
     return Weigher(motion, WeighingSettings(), grip).weigh(GraspFrame(0.0, 0.0, 0.3), None)
 
 
@@ -51,8 +62,31 @@ def test_an_object_is_dragged_lifted_and_set_down():
     motion = RecordingMotion()
     assert weigh(motion) is LiftEnd.HUNG
     assert motion.told == ["begin_hold", "begin_dragging", "end_dragging", "begin_hanging", "end_hanging"]
-    assert max(motion.heights_m) == pytest.approx(WeighingSettings().lift_m)
+    assert max(motion.heights_m) == pytest.approx(LIFTS_m[0])
     assert motion.heights_m[-1] == pytest.approx(0.0)
+
+
+def test_one_that_stands_on_an_edge_is_held_more_firmly_and_lifted_higher():
+    motion, forces_N = RecordingMotion(hangings=(STANDS, FREE)), []
+    assert weigh(motion, hold=forces_N.append) is LiftEnd.HUNG
+    assert motion.told[-4:] == ["begin_hanging", "end_hanging"] * 2
+    assert max(motion.heights_m) == pytest.approx(LIFTS_m[1])
+    assert sorted(set(forces_N)) == pytest.approx([0.8, 1.8])
+
+
+def test_one_that_never_hangs_free_is_set_down_again():
+    motion = RecordingMotion(hangings=[STANDS] * len(LIFTS_m))
+    assert weigh(motion) is LiftEnd.HELD
+    assert max(motion.heights_m) == pytest.approx(LIFTS_m[-1])
+    assert motion.heights_m[-1] == pytest.approx(0.0)
+
+
+def test_a_hand_that_presses_on_what_it_sets_down_goes_back_a_little_and_lifts_no_more():
+    motion = RecordingMotion(hangings=(STANDS, FREE))
+    set_down = lambda: motion.told[-1] == "end_hanging" and motion.heights_m[-1] < 0.01  # noqa: E731
+    assert weigh(motion, is_pressed=set_down) is LiftEnd.ABOVE
+    assert motion.told.count("end_hanging") == 1
+    assert 0.01 < motion.heights_m[-1] < LIFTS_m[0]
 
 
 def test_one_that_is_too_heavy_is_lifted_no_further():
@@ -62,12 +96,12 @@ def test_one_that_is_too_heavy_is_lifted_no_further():
     assert max(motion.heights_m) < 0.001
 
 
-def test_one_that_slips_out_is_let_down_and_not_weighed():
+def test_one_that_slips_out_is_not_weighed_and_the_hand_does_not_come_down_on_it():
     motion = RecordingMotion()
-    end = weigh(motion, holding=lambda: ALL if len(motion.heights_m) < 60 else frozenset({"TH"}))
+    end = weigh(motion, holding=lambda: ALL if len(motion.heights_m) < 105 else frozenset({"TH"}))
     assert end is LiftEnd.LOST
     assert "end_hanging" not in motion.told
-    assert motion.heights_m[-1] == pytest.approx(0.0)
+    assert motion.heights_m[-1] == max(motion.heights_m) > 0.005
 
 
 def test_a_single_jerk_ends_nothing():

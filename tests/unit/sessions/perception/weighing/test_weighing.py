@@ -67,6 +67,24 @@ def test_an_edge_that_still_stands_on_the_table_is_noticed():
     assert not found.is_free
 
 
+def test_an_upward_force_that_varies_shows_an_edge_on_the_table():
+    samples = held_samples(0.0, MASS_kg * GRAVITY)
+    samples.readings[15:25] *= 0.8
+    found = hanging(samples, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+    assert found.unsteady_N > 0.1
+    assert found.stands
+    assert not found.is_free
+
+
+def test_fingertips_that_push_the_object_sideways_show_a_link_that_pushes_back():
+    samples = held_samples(0.0, MASS_kg * GRAVITY)
+    samples.readings[:, :, 1] += 0.3
+    found = hanging(samples, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+    assert found.is_leaned_on
+    assert not found.stands
+    assert not found.is_free
+
+
 def test_friction_of_the_table_is_half_the_difference_between_to_and_fro():
     found = dragging(held_samples(pull_N=1.0, upward_N=-0.2), TIPS, "right")
     assert found.friction_N == pytest.approx(1.0, abs=1e-6)
