@@ -101,7 +101,7 @@ class GraspCycle:
                 self._motion.supervisor.on_approach()
                 return True
             self.lift()
-            if not (fingers := [finger for finger in hit if finger in self._fingers]):
+            if not plan.may_shift or not (fingers := [finger for finger in hit if finger in self._fingers]):
                 return False  # a link above the fingertips: a little aside it would land again
             landed.update(fingers)
             shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad

@@ -27,6 +27,7 @@ class GraspPlan:
         reason: why this grasp was chosen, for people.
         tap: touch first: tap on the top, or from the side touch the side that the hand comes from.
         only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
+        may_shift: where a fingertip lands the hand may try again a little aside.
     """
 
     frame: GraspFrame
@@ -35,6 +36,7 @@ class GraspPlan:
     reason: str = ""
     tap: bool = False
     only_touch: bool = False
+    may_shift: bool = True
 
     def as_plain(self, index: int) -> dict[str, Any]:
         """The plan of grasp number ``index``, from 0, as plain data for viewers; metres and radians on the table."""

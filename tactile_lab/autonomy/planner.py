@@ -88,7 +88,7 @@ class Planner:
         self._for_once = False
         """Whether it plans only one grasp or touch of an object that is otherwise grasped from above."""
 
-        self._blocked, self._was_blocked, self._standstill = 0, False, Standstill()
+        self._blocked, self._standstill = 0, Standstill()
         self.exhausted = ""
         """Why no action is left, in words; empty while there is one."""
         self.search: Search | None = None
@@ -130,12 +130,12 @@ class Planner:
     def _beside(self, index: int) -> GraspPlan | None:
         """A plan for an object that is too tall to pass over, or that blocked the descent; None for others.
 
-        After a blocked descent one touch is captured, if one is possible; then grasps come from above again. What
-        blocks the way down a second time stays where it stands.
+        After a blocked descent one touch is captured, if one is possible; then grasps come from above again. What is
+        wider than the hand opens stays where it stands.
         """
         if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
-            self._standing, self._for_once = self._standing_planner(), not self._was_blocked
-            self._was_blocked = True
+            self._standing = self._standing_planner()
+            self._for_once = not self._standing.felt.is_wide
         if self._standing is None:
             return None
         self.search = self._standing.whereabouts.search()

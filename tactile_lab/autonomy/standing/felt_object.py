@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from gtsam import Pose2
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array, Grasp
+from sessions.conductor.object_gone import OPENING_m
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
@@ -25,6 +27,9 @@ _FAR_m, _NEAR_m = 0.04, 0.010
 
 _UPWARD = 0.7
 """Least vertical part of the normal of a contact on the top."""
+
+_SURELY_m = 0.015
+"""Contacts are few: an object is wider than the box around them."""
 
 _ASSUMED_m = 0.030
 """From the middle to a side of which nothing is known."""
@@ -44,6 +49,10 @@ class FeltObject:
     _points_m: list[Array] = field(default_factory=list)
     _normals: list[Array] = field(default_factory=list)
     _looked_m: list[Array] = field(default_factory=list)
+    _first: BoundingBox = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._first = self.box
 
     @classmethod
     def around(cls, centre_m: Array, top_m: float, points_m: Array, normals: Array) -> FeltObject:
@@ -74,13 +83,28 @@ class FeltObject:
             return
         points_m, normals = np.array(self._points_m), np.array(self._normals)
         top_m = max(self.box.top_m or 0.0, float(points_m[:, 2].max()))
-        beside = on_sides(normals)
+        beside = np.logical_and(on_sides(normals), self._faces_outward(points_m, normals))
         if np.count_nonzero(beside) >= _LEAST_FOR_BOX:
-            pose, low_m, high_m = fit_box(points_m[beside], normals[beside])
-            self.box = replace(self.box, world_T_box=pose, low_m=low_m, high_m=high_m)
+            self.box = self._fitted(points_m[beside], normals[beside])
         places = np.array([self.box.world_T_box.transformTo(point) for point in points_m[:, :2]])
         low_m, high_m = np.minimum(self.box.low_m, places.min(0)), np.maximum(self.box.high_m, places.max(0))
         self.box = replace(self.box, low_m=low_m, high_m=high_m, top_m=top_m)
+
+    def _faces_outward(self, points_m: Array, normals: Array) -> NDArray[np.bool_]:
+        """Which contacts are not on the inside of something hollow, shape (n,)."""
+        outward = points_m[:, :2] - self._first.centre_world_m
+        return np.asarray(np.einsum("nk,nk->n", outward, normals[:, :2]) > 0)
+
+    def _fitted(self, points_m: Array, normals: Array) -> BoundingBox:
+        """The box around contacts on sides; where none faces outward it reaches as far as the first box did."""
+        pose, low_m, high_m = fit_box(points_m, normals)
+        angles = np.arctan2(normals[:, 1], normals[:, 0]) - pose.theta()
+        faces = set((np.round(angles / (np.pi / 2)).astype(int) % 4).tolist())
+        first_m = np.array([pose.transformTo(corner) for corner in _side_middles(self._first)])
+        for face in {0, 1, 2, 3} - faces:
+            axis, bound, outer = face % 2, low_m if face >= 2 else high_m, np.min if face >= 2 else np.max
+            bound[axis] = outer([bound[axis], outer(first_m[:, axis])])
+        return replace(self.box, world_T_box=pose, low_m=low_m, high_m=high_m)
 
     def place(self, points_m: Array, normals: Array) -> None:
         """All contacts as they are placed by now, shape (n, 3) each, world frame: the object has moved a little."""
@@ -112,6 +136,11 @@ class FeltObject:
         angles = np.arctan2(normals[:, 1], normals[:, 0]) - self.box.world_T_box.theta()
         off = np.abs(angles - np.round(angles / (np.pi / 2)) * (np.pi / 2))
         return len(off) >= _LEAST_FOR_BOX and float(off.mean()) > _ROUND_rad
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether the hand does not open as wide in any direction, as far as is known."""
+        return min(self.standing_box.size_m[:2]) > OPENING_m - _SURELY_m
 
     def yaws(self, window_rad: tuple[float, float], askew_rad: float = 0.0) -> list[float]:
         """Of hands that come across its sides, as far as the arm turns; so far from square where it turns less."""
@@ -152,3 +181,11 @@ class FeltObject:
         size_m = self.standing_box.size_m
         width, length = sorted(1e3 * np.array(size_m[:2]))
         return f"the object is {width:.0f} x {length:.0f} mm wide and {1e3 * size_m[2]:.0f} mm high"
+
+
+def _side_middles(box: BoundingBox) -> Array:
+    """The middles of its four sides, world x, y, shape (4, 2)."""
+    middle_m = (box.low_m + box.high_m) / 2
+    places = [(box.low_m[0], middle_m[1]), (box.high_m[0], middle_m[1])]
+    places += [(middle_m[0], box.low_m[1]), (middle_m[0], box.high_m[1])]
+    return np.array([box.world_T_box.transformFrom(np.array(place)) for place in places])

@@ -9,11 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from drivers.core.contacts import Array, Grasp
+from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.rim_planner import RimPlanner
 from tactile_lab.autonomy.standing.search import Whereabouts
 from tactile_lab.autonomy.standing.side_planner import SidePlanner
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
@@ -66,18 +68,20 @@ class StandingPlanner:
     whereabouts: Whereabouts = field(init=False)
     _grasping: SidePlanner = field(init=False)
     _touching: TouchPlanner | None = field(init=False)
+    _pinching: RimPlanner = field(init=False)
 
     def __post_init__(self) -> None:
         self.whereabouts = Whereabouts(self.felt, self.searches)
         where = (self.felt, self.hand, self.yaw_window_rad, self.reach)
-        self._grasping = SidePlanner(*where)
+        self._grasping, self._pinching = SidePlanner(*where), RimPlanner(*where)
         self._touching = None if self.settings is None else TouchPlanner(*where, self.settings)
 
     def plan(self) -> GraspPlan | None:
         """The next grasp or touch; None where nothing is left that would tell anything new, or it has fallen over."""
         if self.whereabouts.is_given_up:
             return None
-        offers = [self._grasping.best(), None if self._touching is None else self._touching.best()]
+        touch = None if self._touching is None else self._touching.best()
+        offers = [self._grasping.best(), self._pinching.best(), touch]
         self._current = max((one for one in offers if one), key=lambda one: one.score_m, default=None)
         return None if self._current is None else self._current.plan
 
@@ -114,7 +118,8 @@ class StandingPlanner:
         self._blocked += 1
         self.whereabouts.on_blocked()
         if not tried.plan.only_touch:
-            self._grasping.blocked.append(tried)
+            is_sideways = closing(tried.plan.closing, tried.plan.height_m, self.hand).is_sideways
+            (self._grasping if is_sideways else self._pinching).blocked.append(tried)
         elif self._touching is not None:
             self._touching.blocked.append(tried)
 

@@ -106,10 +106,9 @@ def test_next_grasp_is_where_nothing_was_touched_until_nothing_is_left() -> None
 
 def meet_one(beside: StandingPlanner, *, is_placed: bool) -> bool:
     """The next grasp, of which one finger meets something; whether there was one."""
-    if (plan := beside.plan()) is None:
+    if beside.plan() is None or (expected := beside._current) is None:
         return False
-    touches = expected_touches(plan, TIP, standing(beside.felt.box), standing(beside.felt.box))
-    beside.on_grasp(grasp(np.array([touches["TH"]]), ["TH"]))
+    beside.on_grasp(grasp(np.array([expected.touches["TH"]]), ["TH"]))
     beside.on_estimate(is_placed, NOTHING, NOTHING)
     return True
 

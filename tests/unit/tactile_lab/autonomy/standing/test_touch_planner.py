@@ -81,6 +81,10 @@ def test_a_blocked_touch_is_not_tried_again() -> None:
 
 def test_what_cannot_be_grasped_is_touched_and_then_ends_in_words() -> None:
     standing = StandingPlanner(felt(), TIP, WINDOW_rad, SideReach(), TouchSettings())
+    pinch = standing.plan()
+    assert pinch is not None
+    assert pinch.reason == "a pinch over the rim, the thumb inside"
+    standing.on_blocked()
     plan = standing.plan()
     assert plan is not None
     assert plan.only_touch
@@ -90,7 +94,7 @@ def test_what_cannot_be_grasped_is_touched_and_then_ends_in_words() -> None:
         standing.on_grasp(contacts(np.empty((0, 3)), (0, 0, 1)))
     assert plan is None
     assert standing.exhausted.startswith("nothing left that the hand can reach: 0 grasps, ")
-    assert "touches, 1 approaches were blocked; the object is 160 x 210 mm wide and 70 mm high" in standing.exhausted
+    assert "touches, 2 approaches were blocked; the object is 160 x 210 mm wide and 70 mm high" in standing.exhausted
 
 
 def test_an_object_grows_with_what_is_felt() -> None:
