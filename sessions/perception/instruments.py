@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.core.fingertip import FingertipSensor
@@ -40,10 +41,18 @@ def warmest_C(reading: object) -> float | None:
     return float(temperature_C[known].max())
 
 
-def motor_torques(reading: object) -> Array | None:
-    """Strain-gauge counts of the motors in a sample of the hand, shape (20,); None before all have reported."""
+def motor_torques(reading: object, fitted: NDArray[np.bool_] | None = None) -> Array | None:
+    """Strain-gauge counts of the motors in a sample of the hand, shape (20,); None before all have reported.
+
+    Args:
+        reading: the sample.
+        fitted: which motors the hand has, shape (20,), the others count as 0; None: all.
+    """
     torques = getattr(getattr(reading, "motor", None), "torque", None)
-    return torques if isinstance(torques, np.ndarray) and np.isfinite(torques).all() else None
+    if not isinstance(torques, np.ndarray):
+        return None
+    known = torques if fitted is None else np.where(fitted, torques, 0.0)
+    return known if np.isfinite(known).all() else None
 
 
 class BaseReading(Protocol):

@@ -117,6 +117,7 @@ class Perception:
         felt = self.fingertips if self.settings.odometry == "touch" else {}
         self.held = HeldObject(felt, form.side, self.settings.odometry_scale, motors)
         """The object since it was grasped."""
+        self._fitted = None if motors is None else motors.is_fitted
         self._scales = Scales(self.held, form.side, self.settings.joint_sigma_rad)
 
     # --- samples -----------------------------------------------------------------------------------------------
@@ -134,7 +135,8 @@ class Perception:
             self._capture.joints_rad.append(joints_rad)
         if self.held.is_watched and self._placement.ready:
             world_T_forearm = self._placement.world_T_forearm
-            self.held.on_hand(sample.stamp_ns, joints_rad, world_T_forearm, motor_torques(sample))
+            counts = motor_torques(sample, self._fitted)
+            self.held.on_hand(sample.stamp_ns, joints_rad, world_T_forearm, counts)
 
     def on_base(self, sample: BaseReading) -> None:
         """Take the positioner's joints."""

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from drivers.core.contacts import FINGERS, StepSigma
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS
+from drivers.shadow.model.motors import MotorMap
 from drivers.simulation.calibration import SimulatedCalibration
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.carrying.link_pushes import LinkPushes
+from sessions.perception.instruments import motor_torques
 from sessions.perception.touch_capture import Measured
+from tactile_lab.rigs.description import load_rig
 
 MOTORS = SimulatedCalibration.from_package().motors
 COUNT, STEP_s = 200, 0.01
@@ -138,6 +142,24 @@ def test_motors_that_scatter_more_hide_more() -> None:
         assert rough.motor_counts is not None
         rubbing = np.repeat(60.0 * chance.standard_normal((COUNT // 8, 20)), 8, axis=0)
         assert links.pushed_s(replace(rough, motor_counts=rough.motor_counts + rubbing)) < 0.3
+
+
+def test_a_hand_with_fewer_motors_tells_what_its_own_do() -> None:
+    motors = MotorMap.load(load_rig("sim-lite").files["motors"])
+    silent = np.where(motors.is_fitted, 7.0, np.nan)
+    assert motor_torques(SimpleNamespace(motor=SimpleNamespace(torque=silent))) is None
+    counts = motor_torques(SimpleNamespace(motor=SimpleNamespace(torque=silent)), motors.is_fitted)
+    assert counts is not None
+    assert counts.tolist() == np.where(motors.is_fitted, 7.0, 0.0).tolist()
+    chance, tips = np.random.default_rng(14), {finger: QuietTip() for finger in ("FF", "MF", "RF", "TH")}
+    links = LinkPushes(motors, tips, "right")
+    for joint, expected_s in ((None, 0.0), (None, 0.0), ("RFJ3", 0.5)):
+        taken = closing(chance) if joint is None else pushing(closing(chance), joint)
+        assert taken.motor_counts is not None
+        own = np.zeros_like(taken.motor_counts)
+        for name in motors.driven:
+            own[:, motors.numbers[name]] = taken.motor_counts[:, MOTORS.numbers[name]]
+        assert links.pushed_s(replace(taken, motor_counts=own)) == pytest.approx(expected_s, abs=0.06)
 
 
 def test_samples_keep_what_motors_reported_only_if_all_did() -> None:
