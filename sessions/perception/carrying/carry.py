@@ -11,6 +11,7 @@ from gtsam import Pose2
 from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.protocol.palm_images import Side
+from sessions.perception.carrying.carry_noise import CarryNoise
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
 from sessions.perception.carrying.lifted import lifted_motions, raised
@@ -32,57 +33,6 @@ _SLIDES_m_s, _SLIDES_N = 0.010, 0.2
 """A fingertip that moves faster than this along the object, and presses more, counts as sliding."""
 _NO_HOLD_s = 0.05
 """Contacts may be missed for a few samples."""
-
-
-@dataclass(frozen=True)
-class CarryNoise:
-    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83).
-
-    Attributes:
-        least_m, least_rad: of any carry.
-        spread_m, spread_rad: share of the differences between the answers of other assumptions about friction.
-        slip_m, slip_rad: share of the slip itself.
-        round_rad: share of the hand's turn that a round object may be off by, for each fingertip beyond two.
-        roll_m: how far a round object with sides that lean rolls when it is let go and grasped, over the sine.
-        let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
-        pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
-            explains: links pushed the object then, which feel nothing.
-        closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
-        links_m_s, links_rad_s: for each second in which links pushed meanwhile.
-        landed_m_s, landed_rad_s: for each second in which links were on the object when the hand came down before.
-        unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
-            object resisted.
-    """
-
-    least_m: float = 0.00008
-    least_rad: float = float(np.deg2rad(0.04))
-    spread_m: float = 1.1
-    spread_rad: float = 0.2
-    slip_m: float = 0.019
-    slip_rad: float = 0.037
-    round_rad: float = 0.083
-    roll_m: float = 0.0045
-    let_go_m_N: float = 0.00006
-    let_go_rad_N: float = float(np.deg2rad(0.07))
-    pushed_m_N: float = 0.001
-    pushed_rad_N: float = float(np.deg2rad(0.5))
-    closed_m_N: float = 0.003
-    closed_rad_N: float = float(np.deg2rad(1.9))
-    links_m_s: float = 0.0026
-    links_rad_s: float = float(np.deg2rad(3.0))
-    landed_m_s: float = 0.007
-    landed_rad_s: float = float(np.deg2rad(10.0))
-    unseen: float = 0.5
-
-    @property
-    def after_m(self) -> tuple[float, float, float]:
-        """Of what happens once the hand is open: net force, links that push, links that land."""
-        return self.closed_m_N, self.links_m_s, self.landed_m_s
-
-    @property
-    def after_rad(self) -> tuple[float, float, float]:
-        """The same of the turn."""
-        return self.closed_rad_N, self.links_rad_s, self.landed_rad_s
 
 
 @dataclass(frozen=True)
