@@ -52,6 +52,12 @@ class EstimatedObject:
         points_m = transform_points(world_T_object, field.contacts_m)
         return points_m, field.normals @ world_T_object.rotation().matrix().T
 
+    def motion_world(self) -> Pose2:
+        """How it has moved on the table since its first pose that is known; identity where none is."""
+        now = self.expected_pose()
+        first = None if now is None else next((pose for pose in self._slam.trajectory if pose is not None), None)
+        return Pose2() if now is None or first is None else now * planar(first).inverse()
+
     def known_shape(self) -> KnownShape | None:
         """The present estimate of the shape; None before there is one.
 

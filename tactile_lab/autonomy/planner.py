@@ -333,7 +333,7 @@ class Planner:
         if self._chooser is not None and not is_placed:
             self._chooser.on_unplaced_grasp()
         if self._standing is not None:
-            self._standing.on_estimate(is_placed, *self._object.contacts_world())
+            self._standing.on_estimate(is_placed, *self._object.contacts_world(), self._object.motion_world())
             self._rule.centre_m = self._standing.middle_m
         known, expected = self._object.known_shape(), self._object.expected_pose()
         if known is not None:

@@ -50,9 +50,11 @@ class FeltObject:
     _normals: list[Array] = field(default_factory=list)
     _looked_m: list[Array] = field(default_factory=list)
     _first: BoundingBox = field(init=False)
+    _moved: BoundingBox = field(init=False)
+    """The first one, where it is by now."""
 
     def __post_init__(self) -> None:
-        self._first = self.box
+        self._first = self._moved = self.box
 
     @classmethod
     def around(cls, centre_m: Array, top_m: float, points_m: Array, normals: Array) -> FeltObject:
@@ -92,7 +94,7 @@ class FeltObject:
 
     def _faces_outward(self, points_m: Array, normals: Array) -> NDArray[np.bool_]:
         """Which contacts are not on the inside of something hollow, shape (n,)."""
-        outward = points_m[:, :2] - self._first.centre_world_m
+        outward = points_m[:, :2] - self._moved.centre_world_m
         return np.asarray(np.einsum("nk,nk->n", outward, normals[:, :2]) > 0)
 
     def _fitted(self, points_m: Array, normals: Array) -> BoundingBox:
@@ -100,15 +102,20 @@ class FeltObject:
         pose, low_m, high_m = fit_box(points_m, normals)
         angles = np.arctan2(normals[:, 1], normals[:, 0]) - pose.theta()
         faces = set((np.round(angles / (np.pi / 2)).astype(int) % 4).tolist())
-        first_m = np.array([pose.transformTo(corner) for corner in _side_middles(self._first)])
+        first_m = np.array([pose.transformTo(corner) for corner in _side_middles(self._moved)])
         for face in {0, 1, 2, 3} - faces:
             axis, bound, outer = face % 2, low_m if face >= 2 else high_m, np.min if face >= 2 else np.max
             bound[axis] = outer([bound[axis], outer(first_m[:, axis])])
         return replace(self.box, world_T_box=pose, low_m=low_m, high_m=high_m)
 
-    def place(self, points_m: Array, normals: Array) -> None:
-        """All contacts as they are placed by now, shape (n, 3) each, world frame: the object has moved a little."""
-        self._points_m, self._normals = [], []
+    def place(self, points_m: Array, normals: Array, motion: Pose2) -> None:
+        """All contacts as they are placed by now, after a motion of the object since its first pose.
+
+        Args:
+            points_m, normals: shape (n, 3) each, world frame.
+            motion: world frame.
+        """
+        self._points_m, self._normals, self._moved = [], [], self._first.move(motion)
         self.add(points_m, normals)
 
     def on_looked(self, places_m: Sequence[Array]) -> None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from gtsam import Pose2
+
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
@@ -100,16 +102,17 @@ class StandingPlanner:
         self.whereabouts.on_grasp(grasp, done, approach_of(done.plan, self.hand))
         self.felt.on_looked([place for finger, place in done.touches.items() if finger not in touched])
 
-    def on_estimate(self, is_placed: bool, points_m: Array, normals: Array) -> None:
+    def on_estimate(self, is_placed: bool, points_m: Array, normals: Array, motion: Pose2) -> None:
         """Take note whether the contacts of the last grasp fit what was felt before, and where all are placed by now.
 
         Args:
             is_placed: whether they fit.
             points_m, normals: of all contacts that the estimate has, shape (n, 3), world frame; perhaps none.
+            motion: of the object since its first pose, world frame.
         """
         self.whereabouts.on_estimate(is_placed)
         if is_placed and len(points_m):
-            self.felt.place(points_m, normals)
+            self.felt.place(points_m, normals, motion)
 
     def on_blocked(self) -> None:
         """Take note that the hand met something on its way."""

@@ -19,7 +19,7 @@ _BLOCKED = 3
 """Approaches in a row: something stands where nothing was felt."""
 
 _SEARCHES = 4
-"""In a session: what falls again and again has to be steadied."""
+"""In a session, but for those that met its top at once: what falls again and again has to be steadied."""
 
 _LIES_AT = (0.35, 0.6)
 """From its foot to where an object that fell is tapped on, in shares of its height."""
@@ -96,11 +96,15 @@ class Whereabouts:
 
     def judge(self, box: BoundingBox) -> Change:
         """What has become of the object, now felt as ``box``."""
-        self.searches, self._reason = self.searches + 1, ""
+        change, self._reason = self._change(box), ""
+        self._only_top_met = change is Change.STANDS and not box.has_sides
+        self.searches += not self._only_top_met
+        return change
+
+    def _change(self, box: BoundingBox) -> Change:
         was = self.felt.box
         if abs((box.top_m or 0.0) - (was.top_m or 0.0)) > max(_FALLEN_m, 0.1 * (was.top_m or 0.0)):
             return Change.FELL
-        self._only_top_met = not box.has_sides
         if not box.has_sides or np.linalg.norm(box.centre_world_m - was.centre_world_m) < _MOVED_m:
             return Change.STANDS
         return Change.MOVED

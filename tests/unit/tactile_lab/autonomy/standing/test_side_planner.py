@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gtsam import Pose2, Pose3
@@ -109,7 +111,7 @@ def meet_one(beside: StandingPlanner, *, is_placed: bool) -> bool:
     if beside.plan() is None or (expected := beside._current) is None:
         return False
     beside.on_grasp(grasp(np.array([expected.touches["TH"]]), ["TH"]))
-    beside.on_estimate(is_placed, NOTHING, NOTHING)
+    beside.on_estimate(is_placed, NOTHING, NOTHING, Pose2())
     return True
 
 
@@ -143,6 +145,15 @@ def test_a_grasp_that_meets_nothing_has_the_top_looked_for_where_it_was_and_besi
     np.testing.assert_allclose(search.places_m[0], beside.felt.top_place_m)
     along_m = np.linalg.norm(search.places_m[1:3] - beside.felt.middle_m, axis=1)
     np.testing.assert_allclose(along_m, [0.35 * 0.187, 0.6 * 0.187])
+
+
+def test_an_object_whose_top_is_met_each_time_is_not_given_up() -> None:
+    beside = planner(box())
+    for _ in range(6):
+        assert beside.plan() is not None
+        beside.on_grasp(grasp(NOTHING, []))
+        assert beside.whereabouts.search() is not None
+        assert beside.whereabouts.judge(replace(beside.felt.box, has_sides=False)) is Change.STANDS
 
 
 @pytest.mark.parametrize(
