@@ -77,10 +77,11 @@ class JointMaker:
         """The joint after ``face``."""
         before, after = self._faces.members(face), self._faces.members(following)
         corner = self._intersection(face, following)
-        for last, first in _outermost(before, after) if corner is not None else ():
-            ends = self._ends(face, following, int(last), int(first))
-            if self._is_plausible(face, following, corner, ends, [last, first]):
-                return Joint(corner[None], np.full(1, np.nan), self._cut(face, following, corner, ends))
+        if corner is not None:
+            for last, first in _outermost(before, after):
+                ends = self._ends(face, following, int(last), int(first))
+                if self._is_plausible(face, following, corner, ends, [last, first]):
+                    return Joint(corner[None], np.full(1, np.nan), self._cut(face, following, corner, ends))
         return self._bridge(self._ends(face, following, int(before[-1]), int(after[0])))
 
     def _ends(self, face: int, following: int, last: int, first: int) -> Array:
@@ -155,7 +156,7 @@ class JointMaker:
 def _to_nearest_end_m(line_m: Array) -> Array:
     """The way along a line from each point to the nearer end, shape (k,)."""
     way_m = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1)))
-    return np.minimum(way_m, way_m[-1] - way_m)
+    return np.asarray(np.minimum(way_m, way_m[-1] - way_m))
 
 
 def _outermost(before: Indices, after: Indices) -> list[tuple[np.int64, np.int64]]:
