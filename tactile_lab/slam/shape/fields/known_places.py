@@ -18,7 +18,7 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
 from tactile_lab.slam.shape.fields.gpis import Gpis
 
-_DEPTH_m = 0.002
+DEPTH_m = 0.002
 """How far outside or inside a told place is, and how uncertain that is."""
 _ROUNDS, _AT_ONCE, _LEAST_INSIDE_m = 4, 40, 0.0005
 _MOST_JOINTS = 6
@@ -39,7 +39,7 @@ def outside_at(gpis: Gpis, free_m: Array) -> Gpis:
         if len(worst) == 0:
             break
         told, free_m = np.vstack([told, free_m[worst]]), np.delete(free_m, worst, axis=0)
-        field = _tell(gpis, told, _DEPTH_m)
+        field = _tell(gpis, told, DEPTH_m)
     return field
 
 
@@ -58,7 +58,7 @@ def in_one_piece(gpis: Gpis, resolution_m: float) -> Gpis:
 
 def inside_at(gpis: Gpis, places_m: Array) -> Gpis:
     """The field with places, shape (q, d), inside the object; normals are observed."""
-    return _tell(gpis, places_m, -_DEPTH_m)
+    return _tell(gpis, places_m, -DEPTH_m)
 
 
 def _tell(gpis: Gpis, places_m: Array, value_m: float) -> Gpis:
@@ -68,7 +68,7 @@ def _tell(gpis: Gpis, places_m: Array, value_m: float) -> Gpis:
         seen,
         points_m=np.vstack([seen.points_m, places_m]),
         values_m=np.append(seen.values_m, np.full(count, value_m)),
-        value_sigma_m=np.append(seen.value_sigma_m, np.full(count, _DEPTH_m)),
+        value_sigma_m=np.append(seen.value_sigma_m, np.full(count, DEPTH_m)),
     )
     return Gpis(gpis.contacts_m, gpis.normals, gpis.settings, observations, gpis.kernel, gpis.prior, gpis.noise_scale)
 

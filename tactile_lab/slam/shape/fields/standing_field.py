@@ -4,7 +4,8 @@ A field alone rounds untouched parts: walls curve inward below the lowest contac
 Here walls continue to the table if the lowest contacts are on vertical walls: the field is also fitted to mirror images
 of these below the table, slightly inward, and cut at the table. A level top is treated likewise if one height explains
 its contacts better than the field does. If the walls are vertical over the whole height and contacts show that their
-upper edge is round, as that of a tin or a carton, the edge at the foot is assumed to have the same radius.
+upper edge is round, as that of a tin or a carton, the edge at the foot is assumed to have the same radius. A field
+that would still end above the table is continued to it (:mod:`floating`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.floating import standing
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
@@ -92,7 +94,7 @@ class StandingField:
             if ended > evidence:
                 evidence, ceiling_m, rest, gpis = ended, level_m, without, walls
         ends = [floor_m] if ceiling_m is None else [floor_m, ceiling_m]
-        field = _fit(gpis, contacts, rest, ends)
+        field = standing(_fit(gpis, contacts, rest, ends), floor_m)
         return cls(field, floor_m, ceiling_m, float(evidence), _gaps(contacts, rest, ends))
 
     def contour(self, resolution_m: float = 0.001) -> Contour:

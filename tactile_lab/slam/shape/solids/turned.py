@@ -17,6 +17,7 @@ from scipy.optimize import minimize
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.floating import standing
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
 from tactile_lab.slam.shape.fields.posterior import Prediction
@@ -92,7 +93,7 @@ class Turned:
     @cached_property
     def profile(self) -> Gpis:
         """The field of the whole section through the axis, with all that is known of places without contacts."""
-        section = _both_halves(self.half, self.floor_m)
+        section = standing(_both_halves(self.half, self.floor_m), self.floor_m)
         return in_one_piece(outside_at(section, np.vstack([self.free_m, self.free_m * [-1, 1]])), _SECTION_GRID_m)
 
     def half_of(self, contacts: WeightedContacts, chosen: NDArray[np.bool_]) -> Gpis:

@@ -32,3 +32,14 @@ def test_a_single_level_contact_on_a_step_does_not_hide_the_top() -> None:
 def test_a_step_below_other_contacts_is_no_top() -> None:
     below = LID_m - [0.0, 0.0, 0.03]
     assert tin_with(np.vstack([below, LID_m[:1]])).ceiling_m is None
+
+
+def test_a_ball_touched_around_its_middle_stays_round_below() -> None:
+    angles, heights_m = 2.4 * np.arange(24), np.linspace(-0.012, 0.03, 24)
+    radius_m = 0.035
+    out = np.sqrt(radius_m**2 - heights_m**2)
+    points_m = np.column_stack([out * np.cos(angles), out * np.sin(angles), heights_m + radius_m])
+    field = Gpis.fit(points_m, (points_m - radius_m * UP) / radius_m, 0.001, 0.08).optimise(max_iterations=10)
+    surface = StandingField.fit(field, 0.0).mesh()
+    low = surface.vertices[surface.vertices[:, 2] < 0.008]
+    assert np.linalg.norm(low[:, :2], axis=1).max() < 0.026

@@ -61,6 +61,18 @@ def test_its_part_of_the_choice_can_be_left_out() -> None:
     assert shape.name != "turned"
 
 
+def test_a_cup_that_was_touched_high_up_only_still_stands_on_the_table() -> None:
+    cup = turned([0, 30, 42, 38, 27, 0], [0, 0, 95, 95, 5, 5])
+    points_m, normals = contacts_on(cup, 400, seed=2)
+    felt = (points_m[:, 2] > 0.036) & (np.einsum("ij,ij->i", points_m[:, :2], normals[:, :2]) > -0.01)
+    kept = np.flatnonzero(felt)[:40]
+    field = Gpis.fit(points_m[kept], normals[kept], POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
+    surface = Turned.fit(field, 0.0).mesh()
+    assert surface.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+    foot = surface.vertices[surface.vertices[:, 2] < 0.004]
+    assert np.linalg.norm(foot[:, :2], axis=1).max() == pytest.approx(0.030, abs=0.012)
+
+
 def test_a_tapered_wall_goes_on_to_the_table_as_it_is_inclined() -> None:
     beaker = turned([0, 20, 36, 0], [0, 0, 80, 80])
     points_m, normals = contacts_on(beaker, 220, seed=4)
