@@ -159,7 +159,9 @@ class Planner:
 
     def _felt_object(self) -> FeltObject:
         top_m = self._rule.top_m or HIGHEST_FROM_ABOVE_m
-        return FeltObject.around(self.centre_m, top_m, *self._object.contacts_world())
+        felt = FeltObject.around(self.centre_m, top_m, *self._object.contacts_world())
+        felt.on_landings(self._landings_m)
+        return felt
 
     def replan(self, index: int) -> GraspPlan:
         """Another plan for the same grasp, after a person has vetoed the last one."""

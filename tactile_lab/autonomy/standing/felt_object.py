@@ -92,6 +92,14 @@ class FeltObject:
         low_m, high_m = np.minimum(self.box.low_m, places.min(0)), np.maximum(self.box.high_m, places.max(0))
         self.box = replace(self.box, low_m=low_m, high_m=high_m, top_m=top_m)
 
+    def on_landings(self, places_m: Sequence[Array]) -> None:
+        """Fingertips landed on it at these places, (3,) each, world: it reaches at least as far."""
+        inside_m = np.array([self.box.world_T_box.transformTo(place[:2]) for place in places_m]).reshape(-1, 2)
+        low_m, high_m = (
+            bound([ends, *inside_m], axis=0) for bound, ends in ((np.min, self.box.low_m), (np.max, self.box.high_m))
+        )
+        self.box = self._first = self._moved = replace(self.box, low_m=low_m, high_m=high_m)
+
     def _faces_outward(self, points_m: Array, normals: Array) -> NDArray[np.bool_]:
         """Which contacts are not on the inside of something hollow, shape (n,)."""
         outward = points_m[:, :2] - self._moved.centre_world_m

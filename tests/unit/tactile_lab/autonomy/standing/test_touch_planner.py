@@ -117,3 +117,11 @@ def test_a_standstill_is_three_grasps_that_add_nothing(shares: tuple[float, ...]
     for share in shares:
         watch.note(share)
     assert watch.is_reached is reached
+
+
+def test_an_object_reaches_as_far_as_fingertips_have_landed_on_it() -> None:
+    known = FeltObject.around(np.zeros(2), 0.06, np.empty((0, 3)), np.empty((0, 3)))
+    assert not known.is_wide
+    known.on_landings([np.array([0.05, -0.045, 0.07]), np.array([-0.05, 0.05, 0.07])])
+    np.testing.assert_allclose(known.standing_box.size_m, [0.10, 0.095, 0.06])
+    assert known.is_wide
