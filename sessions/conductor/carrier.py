@@ -57,6 +57,8 @@ class Carrier:
         palm_motion = cycle.reorient(wanted.turn_rad, wanted.shift_world_m, grasp.touching)
         if cycle.jammed:
             self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: re-orientation stopped early")
+        if cycle.slipped is not None:
+            self._tell(Level.INFO, f"the object slips ({cycle.slipped.in_words()}): re-orientation stopped early")
         return self._told_carry() or palm_motion
 
     def _foretell(self, grasp: Grasp, wanted: Reorientation) -> None:

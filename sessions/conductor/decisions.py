@@ -21,6 +21,7 @@ from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.safety import InterruptGuard, SafetySupervisor
 from sessions.motion.weighing import LiftEnd
 from sessions.perception.carrying.forecast import Forecast
+from sessions.perception.carrying.slip import Slip
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,7 @@ class Performer(Protocol):
 
     landings_world_m: list[Array]
     jammed: tuple[str, ...]
+    slipped: Slip | None
 
     @property
     def plan(self) -> GraspPlan: ...

@@ -14,6 +14,7 @@ from sessions.guided.operator import Ask, Stage
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.perception.carrying.slip import Slip
 from sessions.recording.recorder import Level
 
 
@@ -36,6 +37,7 @@ class GraspByHand:
         self._plan: GraspPlan | None = None
         self.landings_world_m: list[Array] = []
         self.jammed: tuple[str, ...] = ()
+        self.slipped: Slip | None = None
 
     @property
     def plan(self) -> GraspPlan:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydantic import Field
 
 from drivers.core.configuration import StrictModel
@@ -96,7 +97,11 @@ class CycleSettings(StrictModel):
         pressed_N: force on a fingertip above which no other finger presses harder.
         pressed_cycles: cycles in a row with that force after which re-orientation stops.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
+        carry_slack: share by which the forces may be off meanwhile: fingers that yield to each newton with which the
+            table pulls let the object slip.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind would leave the path.
+        carry_slip_m, carry_slip_rad: slip of the object at which a carry ends where it is, as the fingertips feel it.
+        slip_check_s: how often they are asked.
         touch: taps on the top and probes from the side.
         weighing: how a held object is weighed.
         finger_gap_m: the thumb stops at this distance from another tip's centre, before they touch each other.
@@ -133,6 +138,10 @@ class CycleSettings(StrictModel):
     pressed_cycles: int = Field(default=5, ge=1)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
+    carry_slack: float = Field(default=0.6, ge=0.0, lt=1.0)
+    carry_slip_m: float = Field(default=0.004, gt=0.0)
+    carry_slip_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0.0)
+    slip_check_s: float = Field(default=0.2, gt=0.0)
     finger_rad_s: float = Field(default=1.8, gt=0.0)
     touch: TouchSettings = TouchSettings()
     weighing: WeighingSettings = WeighingSettings()

@@ -11,6 +11,7 @@ from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import HandShape
+from sessions.motion.carry_guard import CarryGuard
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_fingers import GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
@@ -23,6 +24,7 @@ from sessions.motion.probing.touching import SideTouch, Toucher
 from sessions.motion.travel import travel_height_m
 from sessions.motion.weighing import Grip, LiftEnd, Weigher
 from sessions.perception.carrying.forecast import Forecast, IntendedCarry
+from sessions.perception.carrying.slip import Slip
 
 _LEAST_HOLD_N = 0.1
 """A fingertip that presses less holds nothing."""
@@ -62,6 +64,9 @@ class GraspCycle:
 
         self.jammed: tuple[str, ...] = ()
         """The fingertips that were pressed so hard in the last re-orientation that it stopped early."""
+
+        self.slipped: Slip | None = None
+        """The slip at which the last re-orientation stopped early."""
 
     @property
     def _fingers(self) -> tuple[str, ...]:
@@ -249,8 +254,8 @@ class GraspCycle:
         self.fingers.build_up(targets_N, self.settings.squeeze_s)
 
     def reorient(self, turn_rad: float, shift_world_m: Array, touching: frozenset[str]) -> Pose3:
-        """Turn about the grasp's vertical axis and shift while holding the object, unless it is jammed
-        (:attr:`jammed`).
+        """Turn about the grasp's vertical axis and shift while holding the object, as far as it is neither jammed
+        (:attr:`jammed`) nor slips (:attr:`slipped`).
 
         Args:
             turn_rad: about world z.
@@ -262,24 +267,16 @@ class GraspCycle:
         """
         motion, table = self._motion, self._table()
         targets_N = self.fingers.balanced_forces_N(touching, self.holding_N)
-        self.jammed, pressed_cycles = (), 0
-
-        def hold() -> bool:
-            nonlocal pressed_cycles
-            self.fingers.servo_forces(targets_N)
-            pressed = self.fingers.pressed(self.settings.pressed_N)
-            pressed_cycles = pressed_cycles + 1 if pressed else 0
-            if pressed_cycles > self.settings.pressed_cycles:
-                self.jammed = pressed
-            return not self.jammed
-
         world_T_before = motion.runtime.perception.world_T_palm
         motion.runtime.begin_hold()
+        begun_ns, held = motion.runtime.clock.now_ns(), motion.runtime.perception.held
+        guard = CarryGuard(self.fingers, targets_N, self.settings, motion.cycle_s, lambda: held.slip_since(begun_ns))
 
         def base_at(share: float) -> Array:
             return motion.base_joints(self._carried_to(share, turn_rad, shift_world_m), table)
 
-        share = motion.follow(base_at, self._carry_s(turn_rad, shift_world_m), hold)
+        share = motion.follow(base_at, self._carry_s(turn_rad, shift_world_m), guard.hold)
+        self.jammed, self.slipped = guard.jammed, guard.slipped
         if self.jammed:
             self.fingers.build_up(targets_N, self.settings.squeeze_s)
         motion.wait(self.settings.rest_s)

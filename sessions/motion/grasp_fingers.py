@@ -121,18 +121,24 @@ class GraspFingers:
             self.servo_forces(targets_N)
             self._motion.tick()
 
-    def servo_forces(self, targets_N: dict[str, float]) -> None:
+    def servo_forces(self, targets_N: dict[str, float], slack: float = 0.0) -> None:
         """One cycle of force control: a fingertip moves along its path in proportion to its force error.
 
         It retreats faster than it presses. A fingertip that is held up presses no further, and none does while another
         is pressed hard. Overloaded fingers without a target force retreat.
+
+        Args:
+            targets_N: by finger.
+            slack: a force that is off by no more than this share of its target is right.
         """
         s, table, loads_N = self.settings, self.table, self._motion.loads_N()
         pressed, held_up = self.pressed(s.pressed_N), self._motion.bent(s.held_up_rad)
         errors_N = dict.fromkeys((*pressed, *held_up), -_HASTE_N)
         for finger, target_N in targets_N.items():
             most_N = 0.0 if pressed or finger in held_up else _HASTE_N
-            errors_N[finger] = float(np.clip(target_N - loads_N.get(finger, 0.0), -_FLIGHT_N, most_N))
+            error_N = target_N - loads_N.get(finger, 0.0)
+            error_N -= float(np.clip(error_N, -slack * target_N, slack * target_N))
+            errors_N[finger] = float(np.clip(error_N, -_FLIGHT_N, most_N))
         for finger, error_N in errors_N.items():
             path = table.path(finger)
             step = s.squeeze_gain * error_N * self._motion.cycle_s / path.length_m

@@ -93,8 +93,8 @@ def tip_over(plant: Plant, cycle: int) -> None:
 @pytest.mark.parametrize(
     ("interfere", "shape", "words"),
     [
-        (lose, "box-10x6x4", "touched by no fingertip for 1."),
-        (leave_to_the_thumb, "box-10x6x4", "held by one fingertip for 1."),
+        (lose, "box-10x6x4", "touched by no fingertip for"),
+        (leave_to_the_thumb, "box-10x6x4", "held by one fingertip for"),
         (fix_to_the_table, "box-10x6x4", "is it jammed, or held by something?"),
         (tip_over, "cube-6", "has it fallen over?"),
     ],

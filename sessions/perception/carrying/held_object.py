@@ -15,6 +15,7 @@ from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.force_delay import ForceDelay
 from sessions.perception.carrying.link_pushes import LinkPushes
 from sessions.perception.carrying.net_wrench import largest_net_N
+from sessions.perception.carrying.slip import Slip, slip
 from sessions.perception.touch_capture import Measured
 
 
@@ -137,6 +138,11 @@ class HeldObject:
         samples = self._record.since(self._from_ns)
         samples = None if samples is None else samples.until(stamp_ns)
         return None if samples is None else self.odometry.estimate(samples)
+
+    def slip_since(self, stamp_ns: int) -> Slip | None:
+        """How far the object has slipped since a moment of this grasp; None if the fingertips do not tell it."""
+        samples = self._record.since(stamp_ns)
+        return None if samples is None else slip(samples, self.fingertips, self._side, self.odometry.friction)
 
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""

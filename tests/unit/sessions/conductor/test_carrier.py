@@ -12,6 +12,7 @@ from sessions.conductor.carrier import Carrier
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.weighing import LiftEnd
 from sessions.perception.carrying.forecast import Forecast
+from sessions.perception.carrying.slip import Slip
 from sessions.recording.recorder import Level
 
 TURN, STAY = Reorientation(0.4, np.zeros(2)), Reorientation(0.0, np.zeros(2))
@@ -25,12 +26,21 @@ class Bench:
     """A carrier with roles that only note what is asked of them."""
 
     def __init__(
-        self, forecast=FIRM, touching=HELD, may_weigh=True, carry=None, jammed=(), can_weigh=True, end=LiftEnd.HUNG
+        self,
+        forecast=FIRM,
+        touching=HELD,
+        may_weigh=True,
+        carry=None,
+        jammed=(),
+        can_weigh=True,
+        end=LiftEnd.HUNG,
+        slipped=None,
     ):
         self.done, self.told, self.logged, self.motions = [], [], [], []
         cycle = SimpleNamespace(
             plan=None,
             jammed=jammed,
+            slipped=slipped,
             squeeze=lambda touching: self.done.append("squeeze"),
             reorient=lambda turn, shift, touching: self.done.append("re-orient") or Pose3(),
         )
@@ -116,6 +126,12 @@ def test_what_is_not_held_any_more_when_it_was_weighed_is_not_carried():
     assert "squeeze" not in Bench(end=LiftEnd.LOST).carry(weighed=True).done
     assert "squeeze" not in Bench(end=LiftEnd.ABOVE).carry(weighed=True).done
     assert "squeeze" in Bench(end=LiftEnd.HELD).carry(weighed=True).done
+
+
+def test_a_slip_that_ended_the_carry_is_told():
+    ((level, words),) = Bench(slipped=Slip(0.0042, 0.05)).carry().told
+    assert level is Level.INFO
+    assert words == "the object slips (4 mm, 3 degrees): re-orientation stopped early"
 
 
 def test_a_weighing_says_how_it_ended_and_what_it_found():

@@ -1,0 +1,56 @@
+"""Holds an object while it is carried, and ends the carry where the object is jammed or slips."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from sessions.motion.cycle_settings import CycleSettings
+from sessions.motion.grasp_fingers import GraspFingers
+from sessions.motion.grasp_plan import holds
+from sessions.perception.carrying.slip import Slip
+
+_LEAST_HOLD_N = 0.05
+"""A fingertip that presses less holds nothing; what is not held does not slip, and its carry goes on."""
+
+
+class CarryGuard:
+    """One cycle after the other of a carry.
+
+    Args:
+        fingers: that hold the object.
+        targets_N: their forces.
+        settings: limits.
+        cycle_s: length of a cycle.
+        slip: how far the object has slipped in this carry; None where the fingertips do not tell it.
+    """
+
+    def __init__(
+        self,
+        fingers: GraspFingers,
+        targets_N: dict[str, float],
+        settings: CycleSettings,
+        cycle_s: float,
+        slip: Callable[[], Slip | None],
+    ) -> None:
+        self._fingers, self._targets_N, self._settings, self._slip = fingers, targets_N, settings, slip
+        self._every = max(1, round(settings.slip_check_s / cycle_s))
+        self._cycles = self._pressed_cycles = 0
+        self.jammed: tuple[str, ...] = ()
+        """The fingertips that were pressed so hard that the carry ended."""
+        self.slipped: Slip | None = None
+        """The slip that ended it."""
+
+    def hold(self) -> bool:
+        """Hold for a cycle. Returns whether the carry goes on."""
+        s = self._settings
+        self._fingers.servo_forces(self._targets_N, s.carry_slack)
+        pressed = self._fingers.pressed(s.pressed_N)
+        self._pressed_cycles = self._pressed_cycles + 1 if pressed else 0
+        if self._pressed_cycles > s.pressed_cycles:
+            self.jammed = pressed
+        self._cycles += 1
+        if self._cycles % self._every == 0 and holds(frozenset(self._fingers.pressed(_LEAST_HOLD_N))):
+            found = self._slip()
+            if found is not None and (found.far_m > s.carry_slip_m or found.turned_rad > s.carry_slip_rad):
+                self.slipped = found
+        return not self.jammed and self.slipped is None
