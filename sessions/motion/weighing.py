@@ -8,10 +8,10 @@ firmly as it may, and lifts it higher.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -45,6 +45,8 @@ class WeighingSettings(StrictModel):
         rest_s: for the object to stop swinging.
         patience: cycles in a row with too much force, or without a hold, after which the object is set down again.
     """
+
+    retired: ClassVar[Mapping[str, str]] = {"lift_m": "lifts_m has how far it is lifted, one lift after the other"}
 
     squeeze_N: float = Field(default=0.8, gt=0.0)
     squeeze_s: float = Field(default=0.5, gt=0.0)

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from drivers.core.configuration import recorded_keys
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.weighing import Grip, LiftEnd, Weigher, WeighingSettings
 from sessions.perception.weighing.weighing import Hanging
@@ -111,3 +112,8 @@ def test_a_single_jerk_ends_nothing():
 
 def test_a_fingertip_that_stays_pressed_ends_it():
     assert weigh(RecordingMotion(), is_pressed=lambda: True) is LiftEnd.PRESSED
+
+
+def test_the_height_of_the_only_lift_of_before_is_read_and_left_out():
+    with recorded_keys():
+        assert WeighingSettings.model_validate({"lift_m": 0.015}) == WeighingSettings()
