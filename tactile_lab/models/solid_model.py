@@ -16,9 +16,11 @@ import trimesh
 from drivers.core.contacts import Array
 from drivers.core.errors import SessionDataError, given_by_a_person
 from drivers.simulation.mesh_object import convex_pieces
+from sessions.perception.weighing.object_properties import Value
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.files.tables import RERUN
+from tactile_lab.evaluation.inertia import EvenBody
 
 ASSUMED_DENSITY_kg_m3 = 600.0
 """Between a filled carton and wood; an unknown object's mass is this times its estimated volume."""
@@ -66,6 +68,7 @@ class SolidModel:
         friction: Coulomb's, against anything.
         lowered_m: height of the object frame's origin over the model's.
         measured_centre_m: x and y of the centre of mass, shape (2,); None if the object was not weighed.
+        mass_sigma_kg, centre_sigma_m: standard deviations of what was measured; 0 for what is stated or assumed.
     """
 
     name: str
@@ -77,17 +80,24 @@ class SolidModel:
     friction: float
     lowered_m: float
     measured_centre_m: Array | None = None
+    mass_sigma_kg: float = 0.0
+    centre_sigma_m: float = 0.0
+
+    @property
+    def body(self) -> EvenBody:
+        """The surface, evenly filled."""
+        mass = Value(self.mass_kg, self.mass_sigma_kg)
+        return EvenBody(self.surface, self.sigma_m, mass, self.measured_centre_m, self.centre_sigma_m)
 
     @property
     def centre_m(self) -> Array:
         """Centre of mass, shape (3,): as measured in x and y, otherwise of the evenly filled surface."""
-        even_m = np.asarray(self.surface.center_mass, dtype=float)
-        return even_m if self.measured_centre_m is None else np.append(self.measured_centre_m, even_m[2])
+        return self.body.centre_m
 
     @property
     def inertia_kg_m2(self) -> Array:
-        """Inertia of the evenly filled surface about its centre, along the model's axes, shape (3, 3)."""
-        return np.asarray(self.surface.moment_inertia, dtype=float) * (self.mass_kg / self.surface.volume)
+        """Inertia of the evenly filled surface about the centre of mass, along the model's axes, shape (3, 3)."""
+        return self.body.inertia_kg_m2
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -106,6 +116,7 @@ class SolidModel:
             "mass_is_assumed": self.mass_is_assumed,
             "centre_of_mass_m": self.centre_m.tolist(),
             "inertia_kg_m2": self.inertia_kg_m2.tolist(),
+            "principal_inertia": self.body.principal().as_json(),
             "friction": self.friction,
             "convex_parts": len(self.parts),
             "surface_sigma_m": {"median": found.median_m, "p95": found.p95_m, "largest": found.largest_m},
@@ -138,18 +149,21 @@ def make_model(
     lowered_m = -float(surface.vertices[:, 2].min())
     surface.apply_translation([0.0, 0.0, lowered_m])
     known = measured or MeasuredBody()
-    stated_kg = known.mass_kg.value if mass_kg is None and known.mass_kg is not None else mass_kg
+    stated = known.mass_kg if mass_kg is None else Value(mass_kg, 0.0)
+    mass = stated or Value(ASSUMED_DENSITY_kg_m3 * float(surface.volume), 0.0)
     usual = ASSUMED_FRICTION if known.table_friction is None else known.table_friction.value
     return SolidModel(
         name=name,
         surface=surface,
         sigma_m=sigma_m,
         parts=tuple(_standing_hull(corners) for corners in convex_pieces(surface)),
-        mass_kg=ASSUMED_DENSITY_kg_m3 * float(surface.volume) if stated_kg is None else stated_kg,
-        mass_is_assumed=stated_kg is None,
+        mass_kg=mass.value,
+        mass_is_assumed=stated is None,
         friction=usual if friction is None else friction,
         lowered_m=lowered_m,
         measured_centre_m=known.centre_m,
+        mass_sigma_kg=mass.sigma,
+        centre_sigma_m=known.centre_sigma_m,
     )
 
 

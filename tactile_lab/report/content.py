@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.core.poses import rotate, transform_points
-from sessions.perception.weighing.object_properties import Value
+from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.evaluation.files.tables import ContactRows
 from tactile_lab.evaluation.trajectory import estimate_T_truth
@@ -109,7 +109,7 @@ class ReportContent:
         contour_sigma_m: standard deviation at each point of the contour, shape (n,); NaN where it is a guess.
         truth: ground truth, or None.
         fitted_outline_m: the true outline fitted to the estimate, shape (n, 2), estimate's object frame, or None.
-        mass_kg: of the object as it was weighed, or None.
+        measured: what is known of the object's mass, as it was weighed.
         course: decisions and stops of the session.
         camera: the marker camera's last picture of a grasp, or None.
         camera_problem: why there is none, "" for a session without camera.
@@ -123,7 +123,7 @@ class ReportContent:
     contour_sigma_m: Array = field(default_factory=lambda: np.zeros(0))
     truth: TrueShape | None = None
     fitted_outline_m: Array | None = None
-    mass_kg: Value | None = None
+    measured: MeasuredBody = field(default_factory=MeasuredBody)
     course: Course = field(default_factory=Course)
     camera: CameraView | None = None
     camera_problem: str = ""

@@ -57,7 +57,7 @@ def gather(session: Session, folder: Path) -> ReportContent:
         contour_sigma_m=sigma_m,
         truth=truth,
         fitted_outline_m=_fit(contour_m, truth),
-        mass_kg=read_measured(folder).mass_kg,
+        measured=read_measured(folder),
         course=read_course(session),
         camera=camera,
         camera_problem=problem,

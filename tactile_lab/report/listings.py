@@ -6,7 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from drivers.core.configuration import flatten_keys
+from drivers.core.contacts import Array
+from tactile_lab.evaluation.files.properties_file import MeasuredBody
+from tactile_lab.evaluation.inertia import PrincipalInertia
 from tactile_lab.evaluation.loops import first_in_map
 from tactile_lab.evaluation.table import UNKNOWN, EvaluationRow, evaluation_rows
 from tactile_lab.report import figures
@@ -15,6 +20,9 @@ from tactile_lab.report.course import Course, PolicyDecision
 from tactile_lab.report.legend import legend
 from tactile_lab.report.markup import Markup, badge, element, figure, join, table
 from tactile_lab.report.uncertainty_figures import calibration_curve
+
+_ANY_deg = 30.0
+"""An axis that may be turned farther is any: two moments cannot be told apart."""
 
 
 def number(value: float | None, digits: int = 1) -> str:
@@ -51,6 +59,44 @@ def _loop_row(loop: Mapping[str, Any], born: int) -> list[str | Markup]:
         verdict,
         str(loop["reason"]),
     ]
+
+
+def body_card(measured: MeasuredBody) -> Markup:
+    """Centre of mass and principal axes of inertia of an object that was weighed."""
+    if measured.centre_m is None and measured.inertia is None:
+        return Markup("")
+    parts = [element("h3", "Mass inside the object")]
+    if measured.centre_m is not None:
+        x_mm, y_mm, two_sigma_mm = (1e3 * float(each) for each in (*measured.centre_m, 2 * measured.centre_sigma_m))
+        text = f"Centre of mass, as weighed: x {x_mm:.1f}, y {y_mm:.1f} ± {two_sigma_mm:.1f} mm (two σ)."
+        parts.append(element("p", text, class_="lead"))
+    if measured.inertia is not None:
+        titles = ["axis", "moment of inertia, kg cm²", "σ, kg cm²", "direction x, y, z", "σ, °"]
+        note = "About the centre of mass, if the estimated shape is evenly filled; σ does not know of hollow objects."
+        parts += [table(titles, _inertia_rows(measured.inertia)), element("p", note, class_="note")]
+    return element("div", *parts, class_="card wide")
+
+
+def _inertia_rows(inertia: PrincipalInertia) -> list[list[str]]:
+    kg_cm2 = np.column_stack([inertia.moments_kg_m2, inertia.moments_sigma_kg_m2]) * 1e4
+    turns_deg = np.degrees(inertia.axes_sigma_rad)
+    return [
+        [
+            str(axis + 1),
+            *(f"{each:.3g}" for each in kg_cm2[axis]),
+            _direction(inertia.axes[axis]),
+            _turn(turns_deg[axis]),
+        ]
+        for axis in range(3)
+    ]
+
+
+def _direction(axis: Array) -> str:
+    return ", ".join(f"{each:+.2f}" for each in np.round(axis, 2) + 0.0)  # no -0.00
+
+
+def _turn(sigma_deg: float) -> str:
+    return "any" if sigma_deg > _ANY_deg else f"{sigma_deg:.0f}"
 
 
 def grasp_section(content: ReportContent) -> Markup:

@@ -27,6 +27,7 @@ def page(content: ReportContent) -> str:
         sections.key_figures(content),
         doubts.doubts_card(content),
         sections.shape_section(content),
+        listings.body_card(content.measured),
         sections.tracking_section(content),
         listings.grasp_section(content),
         listings.decisions_card(content.course),

@@ -79,7 +79,7 @@ def key_figures(content: ReportContent) -> Markup:
         ("Mean distance", number(shape.get("mean_distance_mm")), "mm", _best(best.get("mean_distance_mm"))),
         ("F-score at 1 mm", number(shape.get("fscore_1mm"), 3), "", _best(best.get("fscore_1mm"), 3, "")),
         *_size_tiles(evaluation.get("dimensions") or ()),
-        *_mass_tile(content.mass_kg),
+        *_mass_tile(content.measured.mass_kg),
         ("Position error", number(pose.get("rmse_mm")), "mm", _at_end(pose, "final_mm")),
         ("Rotation error", number(pose.get("rmse_deg")), "°", _at_end(pose, "final_deg")),
         ("Grasps", str(grasps), "", f"{placed} placed, {contacts} contacts"),

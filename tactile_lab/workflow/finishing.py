@@ -173,7 +173,7 @@ def finish(
         wanted = slam.settings
         result = slam.finish()
         write_results(out, result, grasps, wanted.model_dump(mode="json"), wanted.largest_sigma_m)
-        write_properties(out, properties or ObjectProperties(), result.world_T_object)
+        write_properties(out, properties or ObjectProperties(), result.world_T_object, result.mesh)
         evaluation = _write_evaluation(session, rig, out)
         report.write(session.folder, out)
     except TactileLabError as error:

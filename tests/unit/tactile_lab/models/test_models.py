@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -78,12 +79,19 @@ def test_what_was_measured_is_in_the_model_unless_somebody_states_otherwise(tmp_
     model = make_model(file, "angle", measured=measured)
     assert (model.mass_kg, model.mass_is_assumed, model.friction) == (0.2, False, 0.35)
     np.testing.assert_allclose(model.centre_m, [0.003, -0.004, HEIGHT_m / 2], atol=1e-12)
+    assert model.body.principal().moments_sigma_kg_m2 == pytest.approx(
+        np.hypot(
+            replace(model, mass_sigma_kg=0.0).body.principal().moments_sigma_kg_m2,
+            model.body.principal().moments_kg_m2 * 0.05,
+        )
+    )
     stated = make_model(file, "angle", MASS_kg, FRICTION, measured)
     assert (stated.mass_kg, stated.friction) == (MASS_kg, FRICTION)
 
 
 def test_the_uncertainty_is_told_beside_the_model(folder: Path) -> None:
     told = json.loads((folder / "model.json").read_text())
+    assert told["principal_inertia"]["assumes"] == "uniform density"
     assert told["guessed_share"] == pytest.approx(0.25)
     assert told["surface_sigma_m"]["largest"] == pytest.approx(GUESSED_m)
     assert (told["mass_kg"], told["mass_is_assumed"], told["friction"]) == (MASS_kg, False, FRICTION)

@@ -13,8 +13,11 @@ from typing import Literal
 import numpy as np
 import pytest
 import trimesh
+from gtsam import Pose3
 
 from drivers.core.errors import SessionError
+from sessions.perception.weighing.object_properties import ObjectProperties
+from sessions.perception.weighing.weighing import Hanging
 from sessions.recording.running_session import create_session
 from sessions.recording.session import Session
 from sessions.recording.traffic.reader import may_hold
@@ -22,6 +25,7 @@ from tactile_lab import report
 from tactile_lab.colours import UNKNOWN, hex_colour, viridis
 from tactile_lab.evaluation.estimate_with_truth import Truth
 from tactile_lab.evaluation.evaluation import evaluate
+from tactile_lab.evaluation.files.properties_file import write_properties
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.files.trajectory_file import Trajectory, trajectory_text
 from tactile_lab.evaluation.truth.session_truth import TRUTH_TRAJECTORY
@@ -152,6 +156,17 @@ def test_sections_figures_and_facts_are_there(text: str) -> None:
         assert heading in words
     for fact in ("Hausdorff distance", "Registration error", "2026-03-04 05:06:07 UTC", "tracked", "version: gtsam"):
         assert fact in words
+
+
+def test_what_a_weighed_object_holds_is_told(tmp_path: Path) -> None:
+    folder = make_session(tmp_path, 3)
+    assert "Mass inside the object" not in Page(report.write(folder).read_text(encoding="utf-8")).texts
+    weighed = Hanging(3.0, 0.05, np.array([0.002, 0.001]), np.array([0.001, 0.001]), 0.0)
+    shape = result_of(3).mesh
+    write_properties(folder / "results", ObjectProperties(hangings=[(0, weighed)]), [Pose3()], shape)
+    words = Page(report.write(folder).read_text(encoding="utf-8")).texts
+    assert "Centre of mass, as weighed: x 2.0, y 1.0 ± 2.0 mm (two σ)." in words
+    assert {"Mass inside the object", "moment of inertia, kg cm²", "direction x, y, z"} <= set(words)
 
 
 def test_nested_settings_have_dotted_names(text: str) -> None:
