@@ -101,6 +101,10 @@ class BioTac:
         if self._settings.follow_s:
             self._follow(stamp_ns)
 
+    def vibration_at(self, stamp_ns: int) -> tuple[int, ...]:
+        """Readings of the vibration channel (PAC) that came with the sample of this stamp, counts; empty for none."""
+        return self.channels.vibration if self.channels.newest_ns == stamp_ns and self.channels.fitted else ()
+
     def tare(self, world_R_distal: Array, *, reason: str = "") -> None:
         """Take the newest readings as those without contact. A BioTac does not feel its own weight: any orientation
         will do.

@@ -20,6 +20,7 @@ class TrueContact:
         point_world_m: point, shape (3,).
         normal_world: unit normal that points out of the touched thing, shape (3,).
         force_on_tip_world_N: force on the fingertip, shape (3,).
+        slides_m_s: speed at which the surfaces slide along each other there; a tip that rolls does not slide.
     """
 
     finger: str
@@ -27,6 +28,7 @@ class TrueContact:
     point_world_m: Array
     normal_world: Array
     force_on_tip_world_N: Array
+    slides_m_s: float = 0.0
 
 
 class HandPlant(Protocol):

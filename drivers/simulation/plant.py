@@ -178,7 +178,19 @@ class Plant:
             point_world_m=contact.pos.copy(),
             normal_world=towards_tip * frame[0],
             force_on_tip_world_N=towards_tip * (wrench[:3] @ frame),
+            slides_m_s=self._slides_m_s(first, second, contact.pos, frame[1:]),
         )
+
+    def _slides_m_s(self, first: int, second: int, point_m: Array, tangents: Array) -> float:
+        """Speed of one geometry's surface along the other's at a point of both."""
+        one, other = (self._velocity_m_s(geometry, point_m) for geometry in (first, second))
+        return float(np.linalg.norm(tangents @ (other - one)))
+
+    def _velocity_m_s(self, geometry: int, point_m: Array) -> Array:
+        """Velocity of the place of a geometry that is at a point now, shape (3,)."""
+        velocity = np.zeros(6)
+        mujoco.mj_objectVelocity(self._model, self._data, mujoco.mjtObj.mjOBJ_GEOM, geometry, velocity, 0)
+        return np.asarray(velocity[3:] + np.cross(velocity[:3], point_m - self._data.geom_xpos[geometry]))
 
 
 def _addresses(model: mujoco.MjModel, joints: Sequence[str]) -> NDArray[np.intp]:

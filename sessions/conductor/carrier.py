@@ -88,6 +88,8 @@ class Carrier:
     def _told_carry(self) -> Pose3 | None:
         """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""
         perception = self._runtime.perception
+        if (slip := perception.heard_slip) is not None:
+            self._runtime.log(Level.INFO, "odometry", f"the object {slip.in_words()}")
         if (carry := perception.carry) is None:
             return None
         level, words = Level.WARNING if carry.is_remarkable else Level.INFO, f"the object {carry.in_words()}"

@@ -25,6 +25,7 @@ from sessions.perception.approach_paths import TipSurface, approach_paths
 from sessions.perception.carrying.carry import Carry
 from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.carrying.net_wrench import upward_N
+from sessions.perception.carrying.vibration import HeardSlip, SlipHearing, VibratingFingertip
 from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.perception.hand_odometry import HandOdometry
@@ -117,6 +118,7 @@ class Perception:
         felt = self.fingertips if self.settings.odometry == "touch" else {}
         self.held = HeldObject(felt, form.side, self.settings.odometry_scale, motors)
         """The object since it was grasped."""
+        self._hearing = SlipHearing({f: tip for f, tip in felt.items() if isinstance(tip, VibratingFingertip)})
         self._fitted = None if motors is None else motors.is_fitted
         self._scales = Scales(self.held, form.side, self.settings.joint_sigma_rad)
 
@@ -127,6 +129,7 @@ class Perception:
         self._loads_N = None
         for fingertip in self._slots.values():
             fingertip.update(sample)
+        self._hearing.on_sample(sample.stamp_ns)
         if not sample.fresh:
             return
         joints_rad = self._placement.take_joints(sample.joints_rad)
@@ -180,6 +183,11 @@ class Perception:
     def carry(self) -> Carry | None:
         """What the fingertips felt in the last completed hold; None if they felt nothing that tells."""
         return self.held.carry
+
+    @property
+    def heard_slip(self) -> HeardSlip | None:
+        """What fingertips without forces heard of a slip from the last capture until its hold ended; None for none."""
+        return self._hearing.slip
 
     @property
     def properties(self) -> ObjectProperties:
@@ -282,6 +290,7 @@ class Perception:
             case EventKind.TOUCH_END:
                 self._probed.add(self._end_capture(event))
                 self.held.on_left()
+                self._hearing.on_left()
                 return None
             case EventKind.HOLD_BEGIN:
                 self._carried.begin(self.world_T_palm)
@@ -307,6 +316,7 @@ class Perception:
     def _end_hold(self) -> None:
         carry = self.held.end_hold()
         self._carried.end(self.world_T_palm, carry)
+        self._hearing.on_left()
         if carry is not None:
             self._scales.on_carry(carry.sliding, self.grasp_count - 1)
 
@@ -332,6 +342,7 @@ class Perception:
         self._capture = Capture(event.stamp_ns)
         if not self.is_holding:
             self.held.on_capture(event.stamp_ns)
+            self._hearing.on_still()
 
     def _grasp(self, event: SessionEvent) -> Grasp:
         measured, probed = self._end_capture(event), self._probed
@@ -339,6 +350,7 @@ class Perception:
         felt = self.held.end_hold(measured.stamp_ns) if self.is_holding else None
         index, motion = self.grasp_count, self._carried.take(self.world_T_palm, felt)
         self.held.on_grasp(measured)
+        self._hearing.on_carry(event.stamp_ns)
         return Grasp(
             index=index,
             stamp_ns=measured.stamp_ns,

@@ -35,7 +35,14 @@ _STATE = np.dtype(
 _MOST_CONTACTS = 64
 _TOUCHED = ("object", "table")
 _CONTACT = np.dtype(
-    [("finger", "u1"), ("touched", "u1"), ("point_m", "<f8", 3), ("normal", "<f8", 3), ("force_N", "<f8", 3)]
+    [
+        ("finger", "u1"),
+        ("touched", "u1"),
+        ("point_m", "<f8", 3),
+        ("normal", "<f8", 3),
+        ("force_N", "<f8", 3),
+        ("slides_m_s", "<f8"),
+    ]
 )
 _TOUCHES = np.dtype(
     [("world_T_distal", "<f8", (len(FINGERS), 4, 4)), ("count", "<i4"), ("contact", _CONTACT, _MOST_CONTACTS)]
@@ -199,9 +206,11 @@ class PlantMirror:
 
 def _row(contact: TrueContact) -> tuple[object, ...]:
     finger, touched = FINGERS.index(contact.finger), _TOUCHED.index(contact.touched)
-    return finger, touched, contact.point_world_m, contact.normal_world, contact.force_on_tip_world_N
+    placed = contact.point_world_m, contact.normal_world, contact.force_on_tip_world_N
+    return finger, touched, *placed, contact.slides_m_s
 
 
 def _contact(row: np.void) -> TrueContact:
     touched: Literal["object", "table"] = "table" if row["touched"] else "object"
-    return TrueContact(FINGERS[row["finger"]], touched, row["point_m"], row["normal"], row["force_N"])
+    placed = row["point_m"], row["normal"], row["force_N"]
+    return TrueContact(FINGERS[row["finger"]], touched, *placed, float(row["slides_m_s"]))

@@ -1,11 +1,14 @@
 """Five BioTacs in the palm's tactile section: a synthetic response of skin and fluid to the true contacts.
 
 Pressing lowers the counts of the electrodes under the contact. It raises those around it a little, because displaced
-fluid collects there. A tangential force drags the skin along. These laws are assumed, not measured.
+fluid collects there. A tangential force drags the skin along. A contact that slides makes the skin vibrate, the
+more the faster it slides and the harder it presses; nothing else does, neither motors nor touches. These laws are
+assumed, not measured.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -27,6 +30,7 @@ _BULGE_SHARE, _BULGE_WIDTH = 0.10, 2.5
 _SKIN_DRAG_m = 0.0012
 _REST_PDC, _REST_ELECTRODE = (1700.0, 2800.0), (2600.0, 3400.0)  # ranges over sensors
 _REST_PAC, _PAC_NOISE = 2042.0, 10.0
+_VIBRATION_counts_s_m_N = 3000.0  # 15 counts, 1.5 times the noise, at 10 mm/s under 0.5 N: a skin on a smooth thing
 _REST_TAC, _REST_TDC = 1998.0, 2283.0
 _PDC_NOISE, _HEAT_NOISE = 0.5, 1.0
 
@@ -69,15 +73,20 @@ class BiotacSkin:
         pressure = _PRESSURE_counts_N * min(pressing_N, _SOFT_UNTIL_N)
         return np.asarray(self._rest + np.concatenate([[pressure, 0.0, 0.0], -limited]))
 
-    def slot(self, data_type: int, channels: Array | None = None) -> bytes:
-        """The answer to a request, with noise; channels as from :meth:`channels`, by default without contact.
+    def slot(self, data_type: int, channels: Array | None = None, vibration_counts: float = 0.0) -> bytes:
+        """The answer to a request, with noise.
 
         Channels that this sensor lacks are marked invalid.
+
+        Args:
+            data_type: the request.
+            channels: as from :meth:`channels`; by default without contact.
+            vibration_counts: as from :func:`vibration_counts`.
         """
         counts = self._rest if channels is None else channels
         known = [channel for channel in (data_type, data_type + 1) if channel <= len(counts)]
         noise = self._rng.standard_normal(4)
-        vibration = [round(_REST_PAC + _PAC_NOISE * float(value)) for value in noise[2:]]
+        vibration = [_pac(float(value) * math.hypot(_PAC_NOISE, vibration_counts)) for value in noise[2:]]
         values = {
             channel: min(max(round(float(counts[channel - 1] + self._noise[channel - 1] * fresh)), 0), LARGEST_COUNT)
             for channel, fresh in zip(known, noise, strict=False)
@@ -137,8 +146,20 @@ class BiotacSection:
     def _slot(self, finger: str, data_type: int, contacts: tuple[TrueContact, ...]) -> bytes:
         skin = self._skins[finger]
         if touches := [contact for contact in contacts if contact.finger == finger]:
-            return skin.slot(data_type, skin.channels(self._plant.world_T_distal(finger), touches))
+            channels = skin.channels(self._plant.world_T_distal(finger), touches)
+            return skin.slot(data_type, channels, vibration_counts(touches))
         return skin.slot(data_type)
+
+
+def vibration_counts(contacts: Sequence[TrueContact]) -> float:
+    """How strongly sliding contacts make one fingertip's skin vibrate: root mean square, counts of PAC."""
+    pressing_N = [max(float(each.normal_world @ each.force_on_tip_world_N), 0.0) for each in contacts]
+    powers = [force_N * each.slides_m_s for force_N, each in zip(pressing_N, contacts, strict=True)]
+    return _VIBRATION_counts_s_m_N * sum(powers)
+
+
+def _pac(swing: float) -> int:
+    return min(max(round(_REST_PAC + swing), 0), LARGEST_COUNT)
 
 
 def _slots(answers: Sequence[bytes]) -> NDArray[np.uint8]:

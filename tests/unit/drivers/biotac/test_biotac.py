@@ -278,3 +278,14 @@ def test_a_tare_is_refused_while_readings_move(tip: BioTac, channel: int, compla
 def test_a_tactile_section_of_the_wrong_length_is_a_codec_error(tip: BioTac) -> None:
     with pytest.raises(CodecError, match="80"):
         tip.update(Reading(0, 1, 0b100, bytes(79)))
+
+
+def test_vibration_is_that_of_its_own_sample(tip: BioTac) -> None:
+    finger = Finger(tip)
+    assert tip.vibration_at(0) == ()
+    finger.feed(REST)
+    assert tip.vibration_at(finger.stamp_ns) == (2040, 2041)
+    finger.feed(REST, rotations=1, valid=False)
+    assert tip.vibration_at(finger.stamp_ns) == ()
+    finger.feed(dict.fromkeys(REST, 0))
+    assert tip.vibration_at(finger.stamp_ns) == ()

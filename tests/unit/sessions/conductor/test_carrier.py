@@ -13,6 +13,7 @@ from sessions.conductor.estimator import Reorientation
 from sessions.motion.weighing import LiftEnd
 from sessions.perception.carrying.forecast import Forecast
 from sessions.perception.carrying.slip import Slip
+from sessions.perception.carrying.vibration import HeardSlip
 from sessions.recording.recorder import Level
 
 TURN, STAY = Reorientation(0.4, np.zeros(2)), Reorientation(0.0, np.zeros(2))
@@ -35,6 +36,7 @@ class Bench:
         can_weigh=True,
         end=LiftEnd.HUNG,
         slipped=None,
+        heard=None,
     ):
         self.done, self.told, self.logged, self.motions = [], [], [], []
         cycle = SimpleNamespace(
@@ -54,7 +56,7 @@ class Bench:
         )
         properties = SimpleNamespace(in_words=lambda: "mass 300 g")
         runtime = SimpleNamespace(
-            perception=SimpleNamespace(carry=carry, properties=properties, hand_motion_world=FELT),
+            perception=SimpleNamespace(carry=carry, heard_slip=heard, properties=properties, hand_motion_world=FELT),
             log=lambda level, source, text: self.logged.append(text),
         )
         self.grasp = SimpleNamespace(touching=touching, contacts=())
@@ -115,6 +117,12 @@ def test_how_the_object_moved_is_what_the_fingertips_felt(remarkable, told):
     assert bench.told == told
     assert ("the object slipped by 9 mm" in bench.logged) is not remarkable
     assert bench.motions == [FELT]
+
+
+def test_a_slip_that_was_heard_is_logged_and_the_object_moved_with_the_palm():
+    bench = Bench(heard=HeardSlip(("FF", "TH"), 0.8)).carry()
+    assert bench.logged[-1] == "the object slips under FF and TH, for 0.8 s"
+    assert [motion.equals(Pose3(), 1e-12) for motion in bench.motions] == [True]
 
 
 def test_a_re_orientation_that_fingers_stopped_is_told():

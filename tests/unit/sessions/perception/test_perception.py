@@ -12,7 +12,14 @@ from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.event_outcomes import TareReport, TruthFrame
 from sessions.perception.perception import PerceptionSettings
 from sessions.recording.session_events import EventKind, SessionEvent
-from tests.support.session_fakes import FakeBaseSample, FakeFrame, FakeHandSample, make_perception, mount_T_forearm
+from tests.support.session_fakes import (
+    FakeBaseSample,
+    FakeFrame,
+    FakeHandSample,
+    FakeTip,
+    make_perception,
+    mount_T_forearm,
+)
 
 BEND_rad = np.array([0.4 if name[2:] in ("J1", "J2", "J3") else 0.1 for name in JOINTS])
 BASE_q = np.array([0.05, -0.02, 0.2, 0.4, 0.1, -0.2])
@@ -285,3 +292,40 @@ def test_marks_survive_their_written_form():
 def test_foreign_marks_are_refused(data):
     with pytest.raises(SessionError, match="mark"):
         SessionEvent.from_bytes(data)
+
+
+class ShakenTip(FakeTip):
+    """A fingertip in the hand's samples that hears vibrations of this many counts."""
+
+    counts = 5
+
+    def update(self, sample):
+        super().update([np.zeros(3)])
+
+    def vibration_at(self, stamp_ns):
+        return (2000 + self.counts, 2000 - self.counts)
+
+
+def hear_for(perception, from_ms, until_ms):
+    for stamp_ms in range(from_ms, until_ms, 2):
+        hear(perception, stamp_ns=stamp_ms * 1_000_000)
+
+
+@pytest.mark.parametrize(("odometry", "heard"), [("touch", ("TH",)), ("palm", None)])
+def test_a_slip_is_heard_from_the_capture_until_the_hold_ends(odometry, heard):
+    tip = ShakenTip("TH", 0.7)
+    perception = make_perception(slot_fingertips={"TH": tip}, settings=PerceptionSettings(odometry=odometry))
+    hear(perception)
+    tell(perception, EventKind.CAPTURE_BEGIN)
+    hear_for(perception, 0, 200)
+    tell(perception, EventKind.CAPTURE_END, 200_000_000)
+    tell(perception, EventKind.HOLD_BEGIN, 200_000_000)
+    hear_for(perception, 200, 400)
+    assert perception.heard_slip is None
+    tip.counts = 50
+    hear_for(perception, 400, 600)
+    tell(perception, EventKind.HOLD_END, 600_000_000)
+    slip = perception.heard_slip
+    assert (slip and slip.fingers) == heard
+    hear_for(perception, 600, 800)
+    assert perception.heard_slip == slip

@@ -51,7 +51,7 @@ def publish(mirror: PlantMirror, value: float, world_T_object: object = None) ->
 
 
 def contact(finger: str, value: float) -> TrueContact:
-    return TrueContact(finger, "object", np.full(3, value), np.full(3, value), np.full(3, value))
+    return TrueContact(finger, "object", np.full(3, value), np.full(3, value), np.full(3, value), value)
 
 
 def test_what_was_written_is_read(mirror: PlantMirror) -> None:
@@ -59,7 +59,7 @@ def test_what_was_written_is_read(mirror: PlantMirror) -> None:
         publish(mirror, value)
         mirror.publish_touches([contact("FF", value)], [Pose3()] * len(FINGERS))
         assert mirror.joints_rad[0] == mirror.wrenches[4, 5] == value
-        assert mirror.contacts()[0].point_world_m[2] == value
+        assert mirror.contacts()[0].point_world_m[2] == mirror.contacts()[0].slides_m_s == value
 
 
 def test_a_plant_that_stops_while_it_writes_holds_up_no_reader(mirror: PlantMirror) -> None:

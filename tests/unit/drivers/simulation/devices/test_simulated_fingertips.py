@@ -18,7 +18,7 @@ from drivers.core.errors import ConfigurationError
 from drivers.fingertips.biotac import KnownBioTac
 from drivers.shadow.protocol.palm_codec import decode_status as decode_palm
 from drivers.simulation.calibration import SimulatedCalibration
-from drivers.simulation.devices.biotac_emulator import BiotacSkin
+from drivers.simulation.devices.biotac_emulator import BiotacSkin, vibration_counts
 from drivers.simulation.devices.nano_sensors import RESOLUTION
 from drivers.simulation.hand_plant import TrueContact
 from drivers.simulation.settings import BiotacSettings, SimulationSettings
@@ -186,6 +186,36 @@ def test_pressed_biotac_tells_where_it_is_pressed() -> None:
 def test_biotac_pressure_rises_with_force_until_the_skin_rests_on_the_core() -> None:
     assert np.median(pressed_skin(0.5)[2]) == pytest.approx(100, rel=0.1)
     assert np.median(pressed_skin(4.0)[2]) == pytest.approx(400, rel=0.1)
+
+
+def test_biotac_vibrates_while_a_contact_slides_under_it_and_only_then() -> None:
+    calibration = SimulatedCalibration.from_package().tips["biotac"]["FF"].calibration
+    up = np.array([0.0, 0.0, 1.0])
+    scatter = {}
+    for speed_m_s in (0.0, 0.01, 0.03):
+        touch = TrueContact("FF", "object", np.zeros(3), up, 0.5 * up, speed_m_s)
+        skin = BiotacSkin(calibration, BiotacSettings(), np.random.default_rng(3))
+        slots = [decode_slot(skin.slot(1, None, vibration_counts([touch])), 1) for _ in range(300)]
+        scatter[speed_m_s] = np.std([slot.vibration for slot in slots])
+    assert scatter[0.0] == pytest.approx(10.0, rel=0.1)
+    assert scatter[0.01] == pytest.approx(np.hypot(10.0, 15.0), rel=0.1)
+    assert scatter[0.03] == pytest.approx(np.hypot(10.0, 45.0), rel=0.1)
+
+
+def test_a_fingertip_that_is_dragged_over_the_table_slides() -> None:
+    program = Program(BIOTAC)
+    program.drive({}, 30)
+    for _ in pressing_on_the_table(program):
+        if "MF" in program.world.truth().fingers_on_table:
+            break
+    program.drive({}, 40)
+    resting = [contact.slides_m_s for contact in program.plant.contacts()]
+    dragged = []
+    for sideways_m in np.linspace(0.0, 0.02, 20):
+        program.move_base(np.array([*program.plant.base[:1], 0.25 + sideways_m, *program.plant.base[2:]]), 1)
+        dragged += [contact.slides_m_s for contact in program.plant.contacts()]
+    assert max(resting) < 0.005
+    assert max(dragged, default=0.0) > 0.02
 
 
 def test_biotac_without_an_ellipsoid_skin_is_refused() -> None:
