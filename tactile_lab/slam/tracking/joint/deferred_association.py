@@ -7,6 +7,10 @@ push of the closing hand; and, if the object was lost, poses anywhere on the kno
 While the object is explored, and anywhere on it, a grasp needs most of its contacts to be placed. On a known object
 near where the motion leads, two of them with their normals can be enough: otherwise grasps with two or three wrong
 contacts of five stayed left out, a centimetre off.
+
+Contacts are left out one by one, by a field of the others. A side that was touched late and seldom can be left out as a
+whole in this way, while the field without it becomes ever surer. So all are heard again at once, with the kernel that
+explains them, and the evidence decides.
 """
 
 from __future__ import annotations
@@ -29,7 +33,7 @@ Relocate: TypeAlias = Callable[[ContactMap, ContactSet], Array]
 
 _TRIED = 3
 _TRIED_NEAR = 8
-_SMOOTHED = 2
+_SMOOTHED, _SMOOTHING_STEPS = 2, 15
 _LEAST_CONTACTS = 3
 _LEAST_FITTING = 2
 _DOUBTFUL = 2
@@ -78,7 +82,7 @@ def associate_deferred(
     *,
     pushes: bool = True,
 ) -> Hypothesis:
-    """The hypothesis with left-out or badly fitting grasps placed again where that is more likely.
+    """The hypothesis with left-out or badly fitting grasps placed, and left-out contacts heard, if that is likelier.
 
     Args:
         hypothesis: to improve.
@@ -88,6 +92,7 @@ def associate_deferred(
         scorer: scores them.
         pushes: whether the closing hand may have pushed an object left in place.
     """
+    hypothesis = min([hypothesis, *_readmit(hypothesis, scorer)], key=cost)
     for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
         if not _is_doubtful(grasp):
             continue
@@ -101,6 +106,17 @@ def associate_deferred(
             candidates += _place_at(hypothesis, index, anywhere, scorer, _most(contacts), Moved.FREELY)
         hypothesis = min([hypothesis, *candidates], key=cost)
     return hypothesis
+
+
+def _readmit(hypothesis: Hypothesis, scorer: HypothesisScorer) -> list[Hypothesis]:
+    """The hypothesis with all contacts that were left out heard again, if fewer are left out then; smoothed."""
+    left_out = hypothesis.map.left_out_count
+    if left_out < _DOUBTFUL:
+        return []
+    cleaned, _ = scorer.clean(hypothesis.map.with_all_contacts().with_best_kernel())
+    if cleaned.left_out_count >= left_out:
+        return []
+    return [scorer.smooth(cleaned.with_best_kernel(), _SMOOTHING_STEPS)]
 
 
 def _is_doubtful(grasp: PlacedGrasp) -> bool:
@@ -130,7 +146,7 @@ def _place_at(
         if len(cleaned.placed[index].kept) >= fitting:
             found.append(scorer.score(cleaned))
     likeliest = sorted(found, key=cost)[:_SMOOTHED]
-    return [_following(scorer.smooth(one.map, 15), index, scorer) for one in likeliest]
+    return [_following(scorer.smooth(one.map, _SMOOTHING_STEPS), index, scorer) for one in likeliest]
 
 
 def _following(hypothesis: Hypothesis, index: int, scorer: HypothesisScorer) -> Hypothesis:

@@ -69,3 +69,18 @@ def test_a_grasp_that_fits_badly_is_placed_anew(known: ContactMap) -> None:
     found = placed(replace(spoilt, placed=tuple(grasps))).map
     assert found.placed[LATE].left_out == {0}
     assert gap_m(found, known.rows[LATE]) < 0.005
+
+
+def test_a_side_that_was_left_out_as_a_whole_is_heard_again(known: ContactMap) -> None:
+    normals = [known.contacts_of(index).normals for index in range(len(known.placed))]
+    side = normals[0][0]
+    grasps = [
+        replace(grasp, left_out=frozenset(np.flatnonzero(seen @ side > 0.8).tolist()))
+        for grasp, seen in zip(known.placed, normals, strict=True)
+    ]
+    without = replace(known, placed=tuple(grasps)).with_best_kernel()
+    assert without.left_out_count > 5
+    found = placed(without)
+    assert found.map.left_out_count == 0
+    assert found.cost < JUDGE.score(without).cost - 20
+    assert np.median(np.linalg.norm(found.map.rows[:, :2] - known.rows[:, :2], axis=1)) < 0.004
