@@ -265,8 +265,7 @@ class Perception:
         late = (f"fingertips: {self.held.delay.problem}",) if self.held.delay.problem else ()
         return (*(f"{finger}: {text}" for finger, tip in self.fingertips.items() for text in tip.health()), *late)
 
-    # --- session events
-    # -------------------------------------------------------------------------------------------------
+    # --- session events ----------------------------------------------------------------------------------------
 
     def event(self, event: SessionEvent) -> Outcome | None:
         """Process a session event. Returns the grasp, frame or report it completes.
