@@ -10,7 +10,7 @@ contacts of five stayed left out, a centimetre off.
 
 Contacts are left out one by one, by a field of the others. A side that was touched late and seldom can be left out as a
 whole in this way, while the field without it becomes ever surer. So all are heard again at once, with the kernel that
-explains them, and the evidence decides.
+explains them, and the evidence decides, after flat faces: a short kernel explains wrong contacts, too.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ _LEAST_CONTACTS = 3
 _LEAST_FITTING = 2
 _DOUBTFUL = 2
 """Number of left-out contacts from which a grasp's place is searched again."""
+_CLEARLY_nats = 12.0
+"""By which contacts that are heard again must make a hypothesis more likely: more than one wrong contact costs."""
 
 
 def relocate_last(hypothesis: Hypothesis, relocate: Relocate, scorer: HypothesisScorer) -> list[Hypothesis]:
@@ -82,7 +84,7 @@ def associate_deferred(
     *,
     pushes: bool = True,
 ) -> Hypothesis:
-    """The hypothesis with left-out or badly fitting grasps placed, and left-out contacts heard, if that is likelier.
+    """The hypothesis with left-out or badly fitting grasps placed again where that is more likely.
 
     Args:
         hypothesis: to improve.
@@ -92,7 +94,6 @@ def associate_deferred(
         scorer: scores them.
         pushes: whether the closing hand may have pushed an object left in place.
     """
-    hypothesis = min([hypothesis, *_readmit(hypothesis, scorer)], key=cost)
     for index, grasp in enumerate(hypothesis.map.placed[1:], start=1):
         if not _is_doubtful(grasp):
             continue
@@ -108,15 +109,21 @@ def associate_deferred(
     return hypothesis
 
 
-def _readmit(hypothesis: Hypothesis, scorer: HypothesisScorer) -> list[Hypothesis]:
-    """The hypothesis with all contacts that were left out heard again, if fewer are left out then; smoothed."""
+def hear_again(hypothesis: Hypothesis, scorer: HypothesisScorer) -> list[Hypothesis]:
+    """The hypothesis with all contacts that were left out heard again, if that is clearly more likely; smoothed.
+
+    Args:
+        hypothesis: whose contacts are heard.
+        scorer: leaves contacts out, and smooths.
+    """
     left_out = hypothesis.map.left_out_count
     if left_out < _DOUBTFUL:
         return []
     cleaned, _ = scorer.clean(hypothesis.map.with_all_contacts().with_best_kernel())
     if cleaned.left_out_count >= left_out:
         return []
-    return [scorer.smooth(cleaned.with_best_kernel(), _SMOOTHING_STEPS)]
+    heard = scorer.smooth(cleaned.with_best_kernel(), _SMOOTHING_STEPS)
+    return [heard] if heard.cost < hypothesis.cost - _CLEARLY_nats else []
 
 
 def _is_doubtful(grasp: PlacedGrasp) -> bool:

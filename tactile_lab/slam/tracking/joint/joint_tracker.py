@@ -218,7 +218,8 @@ class JointTracker:
             smoothed = [self._scorer.smooth(one.map, iterations) for one in self._hypotheses]
             self._hypotheses = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
-        faceted = opinions.with_faces([opinions.place_deferred(one) for one in self._hypotheses])
+        placed = [opinions.place_deferred(one) for one in self._hypotheses]
+        faceted = opinions.with_faces(placed, opinions.hear_again(min(placed, key=cost)))
         self._rivals = opinions.rivals
         faceted[0] = self._resolve_errors(faceted[0])
         found = PoseCovariances.of(faceted[0].map, self._noise)

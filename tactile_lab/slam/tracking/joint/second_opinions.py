@@ -9,7 +9,7 @@ from __future__ import annotations
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
-from tactile_lab.slam.tracking.joint.deferred_association import Relocate, associate_deferred
+from tactile_lab.slam.tracking.joint.deferred_association import Relocate, associate_deferred, hear_again
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 from tactile_lab.slam.tracking.joint.settings import JointSettings
@@ -65,15 +65,23 @@ class SecondOpinions:
         promising = sorted(others, key=cost)[: self._settings.smoothed]
         return [self._scorer.smooth(other.map, self._settings.iterations) for other in promising]
 
-    def with_faces(self, hypotheses: list[Hypothesis]) -> list[Hypothesis]:
+    def hear_again(self, best: Hypothesis) -> list[Hypothesis]:
+        """The hypothesis with the contacts that it leaves out; none if it leaves out hardly any, or rightly."""
+        return self._mechanisms.add("deferred association", lambda: hear_again(best, self._scorer))
+
+    def with_faces(self, hypotheses: list[Hypothesis], further: list[Hypothesis]) -> list[Hypothesis]:
         """The hypotheses scored by flat faces, most likely first.
 
         If splicing the most likely one makes it more likely without faces, the result is tested too. Faces decide again
         which contacts are left out, so that trajectories that differ only in these are tested once.
+
+        Args:
+            hypotheses: to be tested.
+            further: those that are tested however like the others they are.
         """
         sharp = FacetedScorer(self._scorer, self._noise, self._mechanisms)
         known = self._scorer.different(hypotheses, by_contacts=False)
-        found = [sharp.better(one.map) for one in known]
+        found = [sharp.better(one.map) for one in (*known, *further)]
         best = min(found, key=cost)
         limit = self._scorer.score(best.map).cost
         likelier = self._mechanisms.add("splicing", lambda: self._spliced_below(limit, best, known))
