@@ -53,7 +53,8 @@ class StrictModel(BaseModel):
             current[new] = current.pop(key)
             warnings.warn(RenamedKeyWarning(f"{_reading.get()}{key} is now called {new}"), stacklevel=2)
         for key, instead in cls.retired.items():
-            if current.pop(key, None) is not None:
+            if key in current:
+                del current[key]
                 words = f"{_reading.get()}{key} no longer has any effect: {instead}"
                 warnings.warn(RenamedKeyWarning(words), stacklevel=2)
         return current

@@ -15,7 +15,8 @@ _LOWEST_BAND_m, _STEP_m = 0.010, 0.006
 _ACROSS = (0.0, 1 / 3, 2 / 3)
 """Shares of the way from the middle of the foot to its walls."""
 
-_UPRIGHT_SINE = np.sin(np.deg2rad(20.0))
+UPRIGHT_SINE = np.sin(np.deg2rad(20.0))
+"""Largest vertical part of the normal of an upright wall."""
 
 
 def standing(field: Gpis, floor_m: float) -> Gpis:
@@ -31,7 +32,7 @@ def standing(field: Gpis, floor_m: float) -> Gpis:
     if not _floats(field, floor_m):
         return field
     heights_m, normals = field.contacts_m[:, -1], field.normals
-    walls = np.flatnonzero((np.abs(normals[:, -1]) < _UPRIGHT_SINE) & (heights_m > floor_m))
+    walls = np.flatnonzero((np.abs(normals[:, -1]) < UPRIGHT_SINE) & (heights_m > floor_m))
     if not len(walls):
         return field
     lowest_m = float(heights_m[walls].min())

@@ -16,13 +16,12 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
-from tactile_lab.slam.shape.fields.floating import standing
+from tactile_lab.slam.shape.fields.floating import UPRIGHT_SINE, standing
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
 from tactile_lab.slam.shape.surfaces.surface import Contour, Indices, SurfaceMesh, extract_mesh
 
-_UPRIGHT_SINE = np.sin(np.deg2rad(20.0))
 _LEVEL_COSINE = np.cos(np.deg2rad(20.0))
 _MIRRORED_SHARE = 0.35
 """Share of the object's height from which walls are mirrored at an end."""
@@ -148,7 +147,7 @@ def _walls_near(contacts: WeightedContacts, rest: Indices, end_m: float, ends_m:
     reach_m = _MIRRORED_SHARE * float(np.ptp(np.append(contacts.points_m[:, 2], ends_m)))
     up = np.abs(contacts.normals[rest, 2])
     near = (np.abs(contacts.points_m[rest, 2] - end_m) < reach_m) & (up < _LEVEL_COSINE)
-    walls = near & (up < _UPRIGHT_SINE)
+    walls = near & (up < UPRIGHT_SINE)
     return rest[walls] if walls.sum() >= _LEAST_UPRIGHT_SHARE * near.sum() else rest[:0]
 
 
@@ -172,8 +171,8 @@ def _edge_radius_m(gpis: Gpis, contacts: WeightedContacts, rest: Indices, floor_
     top_m = float(np.median(level))
     tall_m = top_m - floor_m
     below = top_m - heights > _ROUND_SHARE * tall_m
-    edge = ~below & (up > _UPRIGHT_SINE) & (up < _LEVEL_COSINE)
-    upright = np.abs(up[below]) < _UPRIGHT_SINE
+    edge = ~below & (up > UPRIGHT_SINE) & (up < _LEVEL_COSINE)
+    upright = np.abs(up[below]) < UPRIGHT_SINE
     if edge.sum() < _LEAST_ROUND_CONTACTS or upright.sum() < _UPRIGHT_DOWN_SHARE * len(upright):
         return 0.0
     at_half_height = contacts.points_m[rest[edge]] * [1, 1, 0] + [0, 0, (top_m + floor_m) / 2]

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
-from tactile_lab.slam.shape.fields.floating import standing
+from tactile_lab.slam.shape.fields.floating import UPRIGHT_SINE, standing
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
 from tactile_lab.slam.shape.fields.posterior import Prediction
@@ -39,7 +39,7 @@ _AXIS_STEP_m, _AXIS_TOLERANCE_m, _EVIDENCE_TOLERANCE, _AXIS_TRIES = 0.0005, 2e-5
 _KERNEL_STEPS = 20
 _SECTION_GRID_m = 0.001
 _SPACING = 1.5
-_FOOT_SHARE, _UPRIGHT_SINE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, np.sin(np.deg2rad(20.0)), 0.2, 0.006
+_FOOT_SHARE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, 0.2, 0.006
 """As for the standing field: how much of the height is mirrored at the table, and how far inward its walls move."""
 _SURE_SIGMAS = 2.0
 """Walls continue below the table at their own inclination only if it differs from upright by this many sigmas."""
@@ -186,9 +186,9 @@ def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:
         :data:`_INSET_SLOPE` between its contacts and there.
     """
     above_m = rows[:, 1] - floor_m
-    feet = np.flatnonzero((rows[:, 3] > -_UPRIGHT_SINE) & (above_m < _FOOT_SHARE * above_m.max()))
+    feet = np.flatnonzero((rows[:, 3] > -UPRIGHT_SINE) & (above_m < _FOOT_SHARE * above_m.max()))
     near, above_m = rows[feet], above_m[feet]
-    is_wall = near[:, 3] < _UPRIGHT_SINE
+    is_wall = near[:, 3] < UPRIGHT_SINE
     overhang = _overhang(near[is_wall, 2:4], near[is_wall, 5]) * is_wall
     inset_m = np.minimum(_INSET_SLOPE * np.abs(above_m), _LARGEST_INSET_m) * is_wall
     below = near.copy()

@@ -9,26 +9,12 @@ from drivers.core.contacts import FINGERS
 from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm_matrix, palm_T_distal_matrices
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.force_delay import ForceDelay
+from tests.support.wrench_tip import WrenchTip
 
 COUNT, STEP_s, STIFFNESS_N_m = 120, 0.01, 900.0
 
 
-class ForceTip:
-    """Its readings are its wrench."""
-
-    drift = np.zeros(6)
-
-    def reading(self) -> np.ndarray:
-        return np.zeros(6)
-
-    def touches(self, readings: np.ndarray, world_R_distal: np.ndarray) -> None:
-        raise AssertionError("contacts are not asked for")
-
-    def wrenches(self, readings: np.ndarray, world_R_distal: np.ndarray) -> np.ndarray:
-        return readings
-
-
-TIPS = {finger: ForceTip() for finger in FINGERS}
+TIPS = {finger: WrenchTip() for finger in FINGERS}
 
 
 def touching(late_s: float, chance: np.random.Generator) -> CarrySamples:

@@ -18,6 +18,7 @@ from sessions.perception.carrying.link_pushes import LinkPushes
 from sessions.perception.instruments import motor_torques
 from sessions.perception.touch_capture import Measured
 from tactile_lab.rigs.description import load_rig
+from tests.support.wrench_tip import WrenchTip
 
 MOTORS = SimulatedCalibration.from_package().motors
 COUNT, STEP_s = 200, 0.01
@@ -25,22 +26,7 @@ PUSH = slice(90, 140)
 """Half a second in which something is pushed."""
 
 
-class QuietTip:
-    """Its readings are its wrench."""
-
-    drift = np.zeros(6)
-
-    def reading(self) -> np.ndarray:
-        return np.zeros(6)
-
-    def touches(self, readings: np.ndarray, world_R_distal: np.ndarray) -> None:
-        raise AssertionError("contacts are not asked for")
-
-    def wrenches(self, readings: np.ndarray, world_R_distal: np.ndarray) -> np.ndarray:
-        return readings
-
-
-TIPS = {finger: QuietTip() for finger in FINGERS}
+TIPS = {finger: WrenchTip() for finger in FINGERS}
 
 
 def closing(chance: np.random.Generator, *, start_rad: float = 0.3) -> CarrySamples:
@@ -111,7 +97,7 @@ def test_a_joint_that_presses_against_its_own_end_is_no_push() -> None:
 
 def test_fingers_without_a_force_sensor_tell_nothing() -> None:
     chance = np.random.default_rng(7)
-    links = LinkPushes(MOTORS, {"FF": QuietTip()}, "right")
+    links = LinkPushes(MOTORS, {"FF": WrenchTip()}, "right")
     assert links.pushed_s(pushing(closing(chance), "RFJ3")) == 0.0
 
 
@@ -151,7 +137,7 @@ def test_a_hand_with_fewer_motors_tells_what_its_own_do() -> None:
     counts = motor_torques(SimpleNamespace(motor=SimpleNamespace(torque=silent)), motors.is_fitted)
     assert counts is not None
     assert counts.tolist() == np.where(motors.is_fitted, 7.0, 0.0).tolist()
-    chance, tips = np.random.default_rng(14), {finger: QuietTip() for finger in ("FF", "MF", "RF", "TH")}
+    chance, tips = np.random.default_rng(14), {finger: WrenchTip() for finger in ("FF", "MF", "RF", "TH")}
     links = LinkPushes(motors, tips, "right")
     for joint, expected_s in ((None, 0.0), (None, 0.0), ("RFJ3", 0.5)):
         taken = closing(chance) if joint is None else pushing(closing(chance), joint)
