@@ -197,7 +197,7 @@ class Conductor:
         for note in getattr(error, "__notes__", ()):
             self._runtime.log(Level.ERROR, "conductor", note)
         seen = self._runtime.perception
-        return SessionOutcome(ending, text, tuple(self._grasps), dict(seen.drop_counts), error, seen.properties)
+        return SessionOutcome(ending, text, tuple(self._grasps), dict(seen.touches.drop_counts), error, seen.properties)
 
     # --- one grasp ---------------------------------------------------------------------------------------------
 
@@ -211,7 +211,7 @@ class Conductor:
             return
         if grasp is None:
             return
-        missing = dict(self._runtime.perception.dropped)
+        missing = dict(self._runtime.perception.touches.dropped)
         wanted = self._choose_reorientation(grasp)
         if isinstance(wanted, Veto):
             self._runtime.undo()

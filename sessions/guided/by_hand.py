@@ -44,7 +44,7 @@ class GraspByHand:
         """The grasp as the person does it: its frame follows from the palm's pose."""
         assert self._plan is not None
         table = closing(self._plan.closing, self._plan.height_m, self._hand)
-        world_T_grasp = self._motion.runtime.perception.world_T_palm * table.grasp_T_palm.inverse()
+        world_T_grasp = self._motion.runtime.perception.hand.world_T_palm * table.grasp_T_palm.inverse()
         frame = GraspFrame(float(world_T_grasp.x()), float(world_T_grasp.y()), float(world_T_grasp.rotation().yaw()))
         return GraspPlan(frame, self._plan.closing, self._plan.height_m, "led by hand")
 
@@ -91,7 +91,7 @@ class GraspByHand:
         prompt = f"Squeeze, turn the object by about {np.degrees(turn_rad):+.0f}° and put it down. SPACE: done"
         self._console.enter(Stage.ROTATE, prompt, Ask.NEXT, Ask.UNDO)
         runtime = self._motion.runtime
-        world_T_before = runtime.perception.world_T_palm
+        world_T_before = runtime.perception.hand.world_T_palm
         runtime.begin_hold()
         runtime.lead_by_hand()
         for request in self._motion.requests():
@@ -99,7 +99,7 @@ class GraspByHand:
                 break
         runtime.stop()
         runtime.end_hold()
-        return runtime.perception.world_T_palm * world_T_before.inverse()
+        return runtime.perception.hand.world_T_palm * world_T_before.inverse()
 
     def release(self) -> None:
         self._console.enter(

@@ -51,5 +51,5 @@ class GuidedMotion(Motion):
 
     def begin_anew(self) -> None:
         """After a stop: the next motion starts at the present position."""
-        self._base_q = self.runtime.perception.base_q.copy()
+        self._base_q = self.runtime.perception.hand.base_q.copy()
         self._fingers.forget()

@@ -78,7 +78,7 @@ class Watcher:
         loads_N = self._seen.loads_N()
         forces_N = np.array([min(load_N, 1e6) for load_N in loads_N.values()])
         touching = frozenset(finger for finger, load_N in loads_N.items() if load_N > self._touch_force_N)
-        now = _Instant(stamp_ns, touching, forces_N, self._seen.palm_world_m, self._seen.joints_rad)
+        now = _Instant(stamp_ns, touching, forces_N, self._seen.hand.palm_world_m, self._seen.hand.joints_rad)
         if self._since is None or not self._same(now, self._since):
             self._since = now
 
@@ -124,10 +124,10 @@ class Watcher:
         """Observability of contacts computed from the newest samples only; a capture will average."""
         points_m, normals = [], []
         for finger in touching:
-            touch = _touch_distal(self._seen.fingertips[finger], self._seen.world_R_distal(finger))
+            touch = _touch_distal(self._seen.fingertips[finger], self._seen.hand.world_R_distal[finger])
             if touch is None:
                 return None
-            world_T_distal = self._seen.world_T_distal[finger]
+            world_T_distal = self._seen.hand.world_T_distal[finger]
             points_m.append(world_T_distal.transformFrom(touch[0]))
             normals.append(world_T_distal.rotation().rotate(touch[1]))
         if not points_m:

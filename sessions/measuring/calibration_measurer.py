@@ -91,7 +91,7 @@ class PressingHand:
         self._motion = Motion(runtime, self.supervisor)
         self._world_T_mount, self._tips = world_T_mount, dict(tips)
         self._targets_rad: dict[str, float] = {}
-        self._q = runtime.perception.base_q.copy()
+        self._q = runtime.perception.hand.base_q.copy()
 
     # --- pressing ----------------------------------------------------------------------------------------------
 
@@ -160,7 +160,7 @@ class PressingHand:
     def _take_posture(self, joints_rad: Array) -> None:
         """Joints to a posture, straight in joint space."""
         wanted = self._targets_of(joints_rad)
-        start = self._targets_rad or self._targets_of(self.runtime.perception.joints_rad)
+        start = self._targets_rad or self._targets_of(self.runtime.perception.hand.joints_rad)
         way = max(abs(wanted[name] - start[name]) for name in wanted)
         if way > 0.0:
             for share in self._motion.shares(way / self.settings.fingers_rad_s):
@@ -178,8 +178,8 @@ class PressingHand:
         seen, joints, base = self.runtime.perception, [], []
         for _ in range(self._motion.cycles(duration_s)):
             self._motion.tick()
-            joints.append(seen.joints_rad)
-            base.append(seen.base_q)
+            joints.append(seen.hand.joints_rad)
+            base.append(seen.hand.base_q)
             each()
         return HandPose(np.mean(base, axis=0), np.mean(joints, axis=0), seen.form)
 
@@ -227,7 +227,7 @@ class CalibrationMeasurer(PressingHand):
         sensor = seen.fingertips[finger]
         sensor.begin_capture()
         pose = self._mean_pose(self.settings.capture_s)
-        contact = sensor.contact(seen.world_R_distal(finger))
+        contact = sensor.contact(seen.hand.world_R_distal[finger])
         if contact is None:
             hint = "Press again at another place; see tactile-lab rig check"
             raise DeviceError(f"{finger} felt no valid contact", where="touch", hint=hint)

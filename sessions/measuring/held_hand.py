@@ -37,7 +37,7 @@ class HeldHand:
         columns, seen = [JOINT_INDEX[joint] for joint in joints], []
         for _ in range(max(2, round(_READ_s * NANOSECONDS / self._runtime.cycle_ns))):
             self._runtime.cycle()
-            seen.append(self._runtime.perception.joints_rad[columns])
+            seen.append(self._runtime.perception.hand.joints_rad[columns])
         angles = np.degrees(seen)
         spread = np.ptp(angles, axis=0)
         if spread.max() > _STILL_deg:

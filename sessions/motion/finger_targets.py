@@ -68,7 +68,7 @@ class FingerTargets:
 
     def _measured_rad(self) -> dict[str, float]:
         """Present joint angles, and the sums of the coupled ones."""
-        joints = dict(zip(JOINTS, self._runtime.perception.joints_rad.tolist(), strict=True))
+        joints = dict(zip(JOINTS, self._runtime.perception.hand.joints_rad.tolist(), strict=True))
         return joints | {f"{finger}J0": joints[f"{finger}J1"] + joints[f"{finger}J2"] for finger in FINGERS[:4]}
 
 

@@ -169,7 +169,7 @@ class GraspCycle:
             motion.set_base(q)
             motion.tick()
             if self._guard.is_met():
-                motion.set_base(motion.runtime.perception.base_q)
+                motion.set_base(motion.runtime.perception.hand.base_q)
                 self._note_landing(self._guard)
                 self._toucher.capture()
                 self.lift()
@@ -267,7 +267,7 @@ class GraspCycle:
         """
         motion, table = self._motion, self._table()
         targets_N = self.fingers.balanced_forces_N(touching, self.holding_N)
-        world_T_before = motion.runtime.perception.world_T_palm
+        world_T_before = motion.runtime.perception.hand.world_T_palm
         motion.runtime.begin_hold()
         begun_ns, held = motion.runtime.clock.now_ns(), motion.runtime.perception.held
         guard = CarryGuard(self.fingers, targets_N, self.settings, motion.cycle_s, lambda: held.slip_since(begun_ns))
@@ -283,7 +283,7 @@ class GraspCycle:
         self.fingers.ease(touching, self.holding_N)
         motion.runtime.end_hold()
         self._plan = replace(self.plan, frame=self._carried_to(share, turn_rad, shift_world_m))
-        return motion.runtime.perception.world_T_palm * world_T_before.inverse()
+        return motion.runtime.perception.hand.world_T_palm * world_T_before.inverse()
 
     def weigh(self, touching: frozenset[str]) -> LiftEnd:
         """Drag, lift and set down the object that these fingers hold; the runtime's perception knows what was found."""

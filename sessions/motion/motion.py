@@ -54,7 +54,7 @@ class Motion:
     @cached_property
     def _base_q(self) -> Array:
         """The positioner's last target, shape (6,); before the first one, its position."""
-        return self.runtime.perception.base_q.copy()
+        return self.runtime.perception.hand.base_q.copy()
 
     @property
     def form(self) -> HandForm:
@@ -290,7 +290,9 @@ class Motion:
 
     def tip_centre_world_m(self, finger: str, tip: TipEllipsoid) -> Array:
         """Centre of a fingertip now, world frame, shape (3,)."""
-        return np.asarray(self.runtime.perception.world_T_distal[finger].transformFrom(np.array(tip.centre_distal_m)))
+        return np.asarray(
+            self.runtime.perception.hand.world_T_distal[finger].transformFrom(np.array(tip.centre_distal_m))
+        )
 
 
 def smooth(share: float) -> float:

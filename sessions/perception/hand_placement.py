@@ -1,4 +1,4 @@
-"""Pose of the hand in the world from the newest joints of hand and positioner."""
+"""The hand in the world, from the newest joints of hand and positioner."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from gtsam import Pose3
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import FINGERS, Array
 from drivers.core.errors import DeviceError
+from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix
-from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.contact_world import HandGeometry
 
 
@@ -20,11 +20,13 @@ class HandPlacement:
     Args:
         mount_T_forearm: the positioner's kinematics, from its joint vector (6,).
         world_T_mount: the forearm-to-world calibration.
-        side: of the hand.
+        form: of the hand.
     """
 
-    def __init__(self, mount_T_forearm: Callable[[Array], Pose3], world_T_mount: Pose3, side: Side = "right") -> None:
-        self._mount_T_forearm, self._world_T_mount, self._side = mount_T_forearm, world_T_mount, side
+    def __init__(
+        self, mount_T_forearm: Callable[[Array], Pose3], world_T_mount: Pose3, form: HandForm = RIGHT_HAND
+    ) -> None:
+        self._mount_T_forearm, self._world_T_mount, self._form = mount_T_forearm, world_T_mount, form
         self._joints_rad: Array | None = None
         self._base_q: Array | None = None
         self._geometry: HandGeometry | None = None
@@ -53,9 +55,40 @@ class HandPlacement:
         return self._joints_rad, self._base_q
 
     @property
+    def joints_rad(self) -> Array:
+        """Newest joint angles, shape (24,), radians. Raises DeviceError before the first."""
+        return self.latest()[0]
+
+    @property
+    def base_q(self) -> Array:
+        """Newest positioner joints, shape (6,), metres and radians. Raises DeviceError before the first."""
+        return self.latest()[1]
+
+    @property
     def world_T_forearm(self) -> Array:
         """The forearm by the newest positioner joints, shape (4, 4). Raises DeviceError before the first."""
-        return self._world_T_forearm(self.latest()[1])
+        return self._world_T_forearm(self.base_q)
+
+    @property
+    def world_T_palm(self) -> Pose3:
+        """The palm, from the newest joints. Raises DeviceError before the first."""
+        return Pose3(self.current().world_T_palm)
+
+    @property
+    def palm_world_m(self) -> Array:
+        """Origin of the palm, shape (3,), from the newest joints. Raises DeviceError before the first."""
+        return np.asarray(self.current().world_T_palm[:3, 3])
+
+    @property
+    def world_T_distal(self) -> dict[str, Pose3]:
+        """The distal frame of each finger, from the newest joints. Raises DeviceError before the first."""
+        frames = self.current().world_T_distal
+        return {finger: Pose3(frames[FINGERS.index(finger)]) for finger in self._form.fingers}
+
+    @property
+    def world_R_distal(self) -> dict[str, Array]:
+        """Orientation of each distal frame, shape (3, 3), by finger. Raises DeviceError before the first."""
+        return dict(zip(FINGERS, self.current().world_T_distal[:, :3, :3], strict=True))
 
     def current(self) -> HandGeometry:
         """Geometry from the newest joints. Raises DeviceError before the first."""
@@ -65,8 +98,8 @@ class HandPlacement:
 
     def place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
         """Geometry from these joints."""
-        world_T_palm = self._world_T_forearm(base_q) @ forearm_T_palm_matrix(joints_rad, self._side)
-        return HandGeometry(joints_rad, world_T_palm, self._side)
+        world_T_palm = self._world_T_forearm(base_q) @ forearm_T_palm_matrix(joints_rad, self._form.side)
+        return HandGeometry(joints_rad, world_T_palm, self._form.side)
 
     def _world_T_forearm(self, base_q: Array) -> Array:
         return np.asarray((self._world_T_mount * self._mount_T_forearm(base_q)).matrix())

@@ -6,7 +6,6 @@ given, and on their order. So the live session and a replay of its bytes build t
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from math import inf, isinf, isnan
 from typing import Any, Literal
@@ -16,17 +15,17 @@ from gtsam import Pose3
 from pydantic import Field
 
 from drivers.core.configuration import StrictModel
-from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp, StepSigma
-from drivers.core.errors import DeviceError, SessionDataError
+from drivers.core.contacts import FINGERS, Array, Contact, Grasp, StepSigma
+from drivers.core.errors import DeviceError
 from drivers.core.fingertip import FingertipSensor
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.motors import MotorMap
-from sessions.perception.approach_paths import TipSurface, approach_paths
+from sessions.perception.approach_paths import TipSurface
 from sessions.perception.carrying.carry import Carry
 from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.carrying.net_wrench import upward_N
 from sessions.perception.carrying.vibration import HeardSlip, SlipHearing, VibratingFingertip
-from sessions.perception.contact_world import HandGeometry, MountUncertainty
+from sessions.perception.contact_world import MountUncertainty
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
 from sessions.perception.hand_odometry import HandOdometry
 from sessions.perception.hand_placement import HandPlacement
@@ -38,7 +37,7 @@ from sessions.perception.instruments import (
     WrenchFingertip,
     motor_torques,
 )
-from sessions.perception.touch_capture import Capture, Measured, Probed, TouchSelection
+from sessions.perception.touch_capture import ContactErrors, Probed, TouchCapture
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
 from sessions.recording.session_events import EventKind, SessionEvent
@@ -98,18 +97,20 @@ class Perception:
         everyone: dict[str, FingertipSensor] = {**self._wrench, **self._slots}
         self.fingertips: dict[str, FingertipSensor] = {f: everyone[f] for f in FINGERS if f in everyone}
         self.world_T_mount, self.settings = world_T_mount, settings or PerceptionSettings()
-        self._placement = HandPlacement(mount_T_forearm, world_T_mount, form.side)
-        self._selection = TouchSelection(self.fingertips, self.settings.minimum_force_N)
-        self._mount = (
+        self.hand = HandPlacement(mount_T_forearm, world_T_mount, form)
+        """Where the hand is, from the newest samples."""
+        mount = (
             None if mount_covariance is None else MountUncertainty(world_T_mount.matrix(), np.asarray(mount_covariance))
         )
+        errors = ContactErrors(self.settings.joint_sigma_rad, mount)
+        self.touches = TouchCapture(
+            self.fingertips, self.hand, self.settings.minimum_force_N, errors, tip_surfaces or {}
+        )
+        """Captures, and which fingers they have left out."""
         self.hand_stamp_ns: int | None = None
         """Arrival of the newest fresh joint angles; None before the first."""
         self._loads_N: dict[str, float] | None = None
         self._frame: FrameReading | None = None
-        self._capture: Capture | None = None
-        self._tip_surfaces = dict(tip_surfaces or {})
-        self._closing_start: HandGeometry | None = None
         self._probed = Probed()
         self._unheld: dict[EventKind, set[int]] = {EventKind.OBJECT_MOVED: set(), EventKind.OBJECT_FELL: set()}
         """The grasps before which the object was moved otherwise than by the hand that held it."""
@@ -132,21 +133,17 @@ class Perception:
         self._hearing.on_sample(sample.stamp_ns)
         if not sample.fresh:
             return
-        joints_rad = self._placement.take_joints(sample.joints_rad)
+        joints_rad = self.hand.take_joints(sample.joints_rad)
         self.hand_stamp_ns = sample.stamp_ns
-        if self._capture is not None:
-            self._capture.joints_rad.append(joints_rad)
-        if self.held.is_watched and self._placement.ready:
-            world_T_forearm = self._placement.world_T_forearm
+        self.touches.on_joints(joints_rad)
+        if self.held.is_watched and self.hand.ready:
             counts = motor_torques(sample, self._fitted)
-            self.held.on_hand(sample.stamp_ns, joints_rad, world_T_forearm, counts)
+            self.held.on_hand(sample.stamp_ns, joints_rad, self.hand.world_T_forearm, counts)
 
     def on_base(self, sample: BaseReading) -> None:
         """Take the positioner's joints."""
         self._loads_N = None
-        base_q = self._placement.take_base(sample.q)
-        if self._capture is not None:
-            self._capture.base_q.append(base_q)
+        self.touches.on_base(self.hand.take_base(sample.q))
 
     def on_wrench(self, finger: str, samples: Sequence[Any]) -> None:
         """Take samples of one fingertip's own transport."""
@@ -158,11 +155,6 @@ class Perception:
         self._frame = frame
 
     # --- state -------------------------------------------------------------------------------------------------
-
-    @property
-    def ready(self) -> bool:
-        """Whether the hand and the positioner have both sent samples."""
-        return self._placement.ready
 
     @property
     def grasp_count(self) -> int:
@@ -196,46 +188,12 @@ class Perception:
 
     def held_N(self) -> float:
         """Upward force of the fingertips on the object now; 0 where they tell nothing while they move."""
-        return upward_N(self.held.fingertips, self._placement.current().world_T_distal[:, :3, :3])
-
-    @property
-    def joints_rad(self) -> Array:
-        """Newest joint angles, shape (24,), radians. Raises DeviceError before the first."""
-        return self._placement.latest()[0]
-
-    @property
-    def base_q(self) -> Array:
-        """Newest positioner joints, shape (6,), metres and radians. Raises DeviceError before the first."""
-        return self._placement.latest()[1]
-
-    @property
-    def world_T_palm(self) -> Pose3:
-        """The palm, from the newest samples. Raises DeviceError before the first."""
-        return Pose3(self._placement.current().world_T_palm)
-
-    @property
-    def palm_world_m(self) -> Array:
-        """Origin of the palm, shape (3,), from the newest samples. Raises DeviceError before the first."""
-        return np.asarray(self._placement.current().world_T_palm[:3, 3])
-
-    @property
-    def world_T_distal(self) -> dict[str, Pose3]:
-        """The distal frame of each finger, from the newest samples. Raises DeviceError before the first."""
-        frames = self._placement.current().world_T_distal
-        return {finger: Pose3(frames[FINGERS.index(finger)]) for finger in self.form.fingers}
-
-    def world_R_distal(self, finger: str) -> Array:
-        """Orientation of one distal frame, shape (3, 3). Raises DeviceError before the first sample."""
-        return np.asarray(self._placement.current().world_T_distal[FINGERS.index(finger), :3, :3])
-
-    def load_N(self, finger: str) -> float:
-        """Contact force on one fingertip, without the tip's own weight, newest sample."""
-        return self.loads_N()[finger]
+        return upward_N(self.held.fingertips, self.hand.current().world_T_distal[:, :3, :3])
 
     def loads_N(self) -> dict[str, float]:
         """Contact force on each fingertip of the rig; infinite if the newest sample is invalid."""
         if self._loads_N is None:
-            rotations = dict(zip(FINGERS, self._placement.current().world_T_distal[:, :3, :3], strict=True))
+            rotations = self.hand.world_R_distal
             told = {finger: tip.load_N(rotations[finger]) for finger, tip in self.fingertips.items()}
             self._loads_N = {finger: inf if isnan(load_N) else load_N for finger, load_N in told.items()}
         return dict(self._loads_N)
@@ -249,16 +207,6 @@ class Perception:
     def probed(self) -> tuple[Contact, ...]:
         """Contacts of touches without a grasp; they wait for the next grasp, and are forgotten with the next hold."""
         return tuple(self._probed.contacts)
-
-    @property
-    def dropped(self) -> dict[str, str]:
-        """Fingers without a contact in the last grasp, and why; problems of the sensors are in problems()."""
-        return self._selection.dropped
-
-    @property
-    def drop_counts(self) -> Counter[str]:
-        """The reasons over the whole session."""
-        return self._selection.drop_counts
 
     def problems(self) -> tuple[str, ...]:
         """Problems of fingertips, each beginning with the finger's name, or ``fingertips`` for all of them."""
@@ -278,7 +226,7 @@ class Perception:
             case EventKind.TARE:
                 return self._tare(event)
             case EventKind.CLOSE_BEGIN:
-                self._closing_start = self._placement.current()
+                self.touches.on_close()
                 self.held.on_close(event.stamp_ns)
                 return None
             case EventKind.CAPTURE_BEGIN:
@@ -287,12 +235,12 @@ class Perception:
             case EventKind.CAPTURE_END:
                 return self._grasp(event)
             case EventKind.TOUCH_END:
-                self._probed.add(self._end_capture(event))
+                self._probed.add(self.touches.end(event))
                 self.held.on_left()
                 self._hearing.on_left()
                 return None
             case EventKind.HOLD_BEGIN:
-                self._carried.begin(self.world_T_palm)
+                self._carried.begin(self.hand.world_T_palm)
                 self.held.on_hold(event.stamp_ns)
                 self._probed = Probed()
                 return None
@@ -314,13 +262,13 @@ class Perception:
 
     def _end_hold(self) -> None:
         carry = self.held.end_hold()
-        self._carried.end(self.world_T_palm, carry)
+        self._carried.end(self.hand.world_T_palm, carry)
         self._hearing.on_left()
         if carry is not None:
             self._scales.on_carry(carry.sliding, self.grasp_count - 1)
 
     def _tare(self, event: SessionEvent) -> TareReport:
-        self._placement.latest()
+        self.hand.latest()
         if set(self.fingertips) <= set(event.fingers):
             self.held.on_tare(event.stamp_ns)
         self._loads_N = None
@@ -329,25 +277,22 @@ class Perception:
             if finger not in self.fingertips:
                 continue
             try:
-                self.fingertips[finger].tare(self.world_R_distal(finger))
+                self.fingertips[finger].tare(self.hand.world_R_distal[finger])
             except DeviceError as error:
                 refused[finger] = error.what
         return TareReport(event.stamp_ns, refused)
 
     def _begin_capture(self, event: SessionEvent) -> None:
-        self._placement.latest()
-        for fingertip in self.fingertips.values():
-            fingertip.begin_capture()
-        self._capture = Capture(event.stamp_ns)
+        self.touches.begin(event.stamp_ns)
         if not self.is_holding:
             self.held.on_capture(event.stamp_ns)
             self._hearing.on_still()
 
     def _grasp(self, event: SessionEvent) -> Grasp:
-        measured, probed = self._end_capture(event), self._probed
+        measured, probed = self.touches.end(event), self._probed
         self._probed = Probed()
         felt = self.held.end_hold(measured.stamp_ns) if self.is_holding else None
-        index, motion = self.grasp_count, self._carried.take(self.world_T_palm, felt)
+        index, motion = self.grasp_count, self._carried.take(self.hand.world_T_palm, felt)
         self.held.on_grasp(measured)
         self._hearing.on_carry(event.stamp_ns)
         return Grasp(
@@ -366,35 +311,15 @@ class Perception:
             return _PUSHED
         return self.held.then_closed(felt) if index else None
 
-    def _end_capture(self, event: SessionEvent) -> Measured:
-        """Contacts and geometry from the samples since the capture began."""
-        capture, self._capture = self._capture, None
-        if capture is None:
-            text = f"{event.kind.value} without capture_begin"
-            raise SessionDataError(text, where="/marks", hint="The session events are out of order")
-        joints_rad, base_q = self._placement.latest()
-        geometry = self._placement.place(capture.joints(joints_rad), capture.base(base_q))
-        tips = self._selection.touches(geometry, heard=bool(capture.joints_rad))
-        contacts = geometry.contacts(tips, self.settings.joint_sigma_rad, self._mount)
-        stamp_ns = (capture.stamp_ns + event.stamp_ns) // 2
-        return Measured(stamp_ns, geometry.world_T_palm, contacts, self._ways(geometry, contacts))
-
-    def _ways(self, geometry: HandGeometry, contacts: Sequence[Contact]) -> tuple[ApproachPath, ...]:
-        """Approach paths of this grasp; a second capture after the same closing has none."""
-        begun, self._closing_start = self._closing_start, None
-        if begun is None:
-            return ()
-        return approach_paths(begun.world_T_distal, geometry.world_T_distal, self._tip_surfaces, contacts)
-
     def _truth_frame(self) -> TruthFrame | None:
         frame, self._frame = self._frame, None
         if frame is None:
             return None
-        current = self.grasp_count if self._capture is not None else self.grasp_count - 1
+        current = self.grasp_count if self.touches.is_open else self.grasp_count - 1
         return TruthFrame(current if current >= 0 else None, frame)
 
     def _undo(self) -> Undone:
         self._carried.undo()
-        self._capture = None
+        self.touches.abandon()
         self._scales.undo(self.grasp_count)
         return Undone(self.grasp_count)

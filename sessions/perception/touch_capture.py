@@ -1,4 +1,4 @@
-"""Samples collected while the fingers touch, and the selection of valid contacts."""
+"""From the samples while the fingers touch to contacts: what a capture measures."""
 
 from __future__ import annotations
 
@@ -9,62 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact
+from drivers.core.errors import SessionDataError
 from drivers.core.fingertip import FingertipSensor, TipContact
-from sessions.perception.contact_world import HandGeometry
-
-
-class TouchSelection:
-    """Selects valid touches.
-
-    Args:
-        fingertips: sensors, by finger.
-        minimum_force_N: a lighter touch does not count as a contact.
-    """
-
-    def __init__(self, fingertips: Mapping[str, FingertipSensor], minimum_force_N: float) -> None:
-        self._fingertips, self._minimum_force_N = fingertips, minimum_force_N
-        self.dropped: dict[str, str] = {}
-        """Fingers without a contact in the last grasp, and why."""
-        self.drop_counts: Counter[str] = Counter()
-        """The reasons over the whole session."""
-
-    def touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
-        """The valid touches; :attr:`dropped` has the reasons for rejected ones.
-
-        Args:
-            geometry: the hand during the capture.
-            heard: whether joint angles arrived during it.
-        """
-        tips, self.dropped = {}, {}
-        for finger, fingertip in self._fingertips.items():
-            tip = fingertip.contact(geometry.world_T_distal[FINGERS.index(finger), :3, :3])
-            if tip is None:
-                self.dropped[finger] = "no contact"
-            elif not heard:
-                self.dropped[finger] = "no joint angles during the capture"
-            elif tip.force_N < self._minimum_force_N:
-                self.dropped[finger] = "force below the minimum"
-            else:
-                tips[finger] = tip
-        self.drop_counts.update(self.dropped.values())
-        return tips
-
-
-@dataclass(frozen=True)
-class Capture:
-    """Samples since a capture began."""
-
-    stamp_ns: int
-    joints_rad: list[Array] = field(default_factory=list)
-    base_q: list[Array] = field(default_factory=list)
-
-    def joints(self, otherwise: Array) -> Array:
-        """Mean joint angles, shape (24,), radians."""
-        return _mean(self.joints_rad, otherwise)
-
-    def base(self, otherwise: Array) -> Array:
-        """Mean positioner joints, shape (6,), metres and radians."""
-        return _mean(self.base_q, otherwise)
+from sessions.perception.approach_paths import TipSurface, approach_paths
+from sessions.perception.contact_world import HandGeometry, MountUncertainty
+from sessions.perception.hand_placement import HandPlacement
+from sessions.recording.session_events import SessionEvent
 
 
 @dataclass(frozen=True)
@@ -87,6 +37,122 @@ class Probed:
     def add(self, measured: Measured) -> None:
         self.contacts += [replace(contact, probed=True) for contact in measured.contacts]
         self.ways += measured.ways
+
+
+@dataclass(frozen=True)
+class _Samples:
+    """What arrived since a capture began."""
+
+    stamp_ns: int
+    joints_rad: list[Array] = field(default_factory=list)
+    base_q: list[Array] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class ContactErrors:
+    """What contacts are uncertain by, beside their sensors' own errors.
+
+    Attributes:
+        joint_sigma_rad: standard deviation of each joint angle that averaging does not remove.
+        mount: the forearm-to-world calibration's; None if unknown.
+    """
+
+    joint_sigma_rad: float
+    mount: MountUncertainty | None = None
+
+
+class TouchCapture:
+    """Measures what the fingertips touch, each time from a beginning to an end.
+
+    Args:
+        fingertips: sensors, by finger.
+        hand: where the hand is.
+        minimum_force_N: a lighter touch does not count as a contact.
+        errors: of the contacts.
+        tip_surfaces: of the fingertips whose approach paths are computed, by finger.
+    """
+
+    def __init__(
+        self,
+        fingertips: Mapping[str, FingertipSensor],
+        hand: HandPlacement,
+        minimum_force_N: float,
+        errors: ContactErrors,
+        tip_surfaces: Mapping[str, TipSurface],
+    ) -> None:
+        self._fingertips, self._hand, self._minimum_force_N = fingertips, hand, minimum_force_N
+        self._errors, self._tip_surfaces = errors, dict(tip_surfaces)
+        self._samples: _Samples | None = None
+        self._closing_start: HandGeometry | None = None
+        self.dropped: dict[str, str] = {}
+        """Fingers without a contact in the last capture, and why."""
+        self.drop_counts: Counter[str] = Counter()
+        """The reasons over the whole session."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether a capture has begun and not ended."""
+        return self._samples is not None
+
+    def on_close(self) -> None:
+        """The fingers begin to close: their approach paths begin here. Raises DeviceError without samples."""
+        self._closing_start = self._hand.current()
+
+    def on_joints(self, joints_rad: Array) -> None:
+        """Joint angles of the hand, shape (24,), radians."""
+        if self._samples is not None:
+            self._samples.joints_rad.append(joints_rad)
+
+    def on_base(self, base_q: Array) -> None:
+        """Joints of the positioner, shape (6,), metres and radians."""
+        if self._samples is not None:
+            self._samples.base_q.append(base_q)
+
+    def begin(self, stamp_ns: int) -> None:
+        """Collect from now on. Raises DeviceError without samples of hand and positioner."""
+        self._hand.latest()
+        for fingertip in self._fingertips.values():
+            fingertip.begin_capture()
+        self._samples = _Samples(stamp_ns)
+
+    def abandon(self) -> None:
+        """Forget what was collected."""
+        self._samples = None
+
+    def end(self, event: SessionEvent) -> Measured:
+        """Contacts and geometry from the samples since the beginning. Raises SessionError if there was none."""
+        samples, self._samples = self._samples, None
+        if samples is None:
+            text = f"{event.kind.value} without capture_begin"
+            raise SessionDataError(text, where="/marks", hint="The session events are out of order")
+        joints_rad, base_q = self._hand.latest()
+        geometry = self._hand.place(_mean(samples.joints_rad, joints_rad), _mean(samples.base_q, base_q))
+        tips = self._valid_touches(geometry, heard=bool(samples.joints_rad))
+        contacts = geometry.contacts(tips, self._errors.joint_sigma_rad, self._errors.mount)
+        stamp_ns = (samples.stamp_ns + event.stamp_ns) // 2
+        return Measured(stamp_ns, geometry.world_T_palm, contacts, self._ways(geometry, contacts))
+
+    def _valid_touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
+        tips, self.dropped = {}, {}
+        for finger, fingertip in self._fingertips.items():
+            tip = fingertip.contact(geometry.world_T_distal[FINGERS.index(finger), :3, :3])
+            if tip is None:
+                self.dropped[finger] = "no contact"
+            elif not heard:
+                self.dropped[finger] = "no joint angles during the capture"
+            elif tip.force_N < self._minimum_force_N:
+                self.dropped[finger] = "force below the minimum"
+            else:
+                tips[finger] = tip
+        self.drop_counts.update(self.dropped.values())
+        return tips
+
+    def _ways(self, geometry: HandGeometry, contacts: tuple[Contact, ...]) -> tuple[ApproachPath, ...]:
+        """Approach paths of this grasp; a second capture after the same closing has none."""
+        begun, self._closing_start = self._closing_start, None
+        if begun is None:
+            return ()
+        return approach_paths(begun.world_T_distal, geometry.world_T_distal, self._tip_surfaces, contacts)
 
 
 def _mean(samples: list[Array], otherwise: Array) -> Array:

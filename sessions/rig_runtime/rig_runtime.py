@@ -173,7 +173,7 @@ class RigRuntime:
 
     def _await_first_samples(self) -> None:
         give_up_ns = self.clock.now_ns() + READY_TIMEOUT_ns
-        while not self.perception.ready:
+        while not self.perception.hand.ready:
             if self.clock.now_ns() > give_up_ns:
                 what = f"no sample from the hand or the positioner within {READY_TIMEOUT_ns / NANOSECONDS:g} s"
                 raise DeviceError(what, where="rig runtime", hint="Check power and cables, then try again")
@@ -220,7 +220,7 @@ class RigRuntime:
             stamp_ns=self._timing.begun_ns,
             hand_stamp_ns=seen.hand_stamp_ns,
             loads_N=seen.loads_N(),
-            palm_world_m=seen.palm_world_m,
+            palm_world_m=seen.hand.palm_world_m,
             tip_stamps_ns={finger: None if heard is None else heard.stamp_ns for finger, heard in tips.items()},
             force_ranges_N=self._force_ranges_N,
             warmest_C=None if hand is None else warmest_C(hand.sample),
@@ -257,7 +257,7 @@ class RigRuntime:
         """Compute a grasp from the samples since :meth:`begin_capture`."""
         grasp = self._record_event(EventKind.CAPTURE_END)
         assert isinstance(grasp, Grasp)
-        self.recorder.grasp(self.clock.now_ns(), grasp, self.perception.dropped)
+        self.recorder.grasp(self.clock.now_ns(), grasp, self.perception.touches.dropped)
         self._state.record_truth()
         return grasp
 

@@ -58,13 +58,13 @@ class StateRecording:
     def record(self) -> None:
         """Record everything that is due. Raises SessionError."""
         now_ns, recorder, seen = self._clock.now_ns(), self._observer.recorder, self._observer.interpreter.perception
-        if not (seen.ready and recorder.state_due(now_ns)):
+        if not (seen.hand.ready and recorder.state_due(now_ns)):
             return
-        joints = dict(zip(JOINTS, seen.joints_rad.tolist(), strict=True))
-        recorder.joints(now_ns, joints, dict(zip(BASE_JOINTS, seen.base_q.tolist(), strict=True)))
+        joints = dict(zip(JOINTS, seen.hand.joints_rad.tolist(), strict=True))
+        recorder.joints(now_ns, joints, dict(zip(BASE_JOINTS, seen.hand.base_q.tolist(), strict=True)))
         recorder.loads(now_ns, seen.loads_N())
         record_fingertips(recorder, now_ns, seen.fingertips)
-        recorder.frames(now_ns, {"palm": seen.world_T_palm, **seen.world_T_distal})
+        recorder.frames(now_ns, {"palm": seen.hand.world_T_palm, **seen.hand.world_T_distal})
         self.record_truth()
         self._losses.look()
         self.watch.look([*self._devices.problems(), *self._losses.problems(), *seen.problems()])

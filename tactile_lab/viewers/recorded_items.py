@@ -71,8 +71,8 @@ class RecordedItems:
         samples, self._samples = self._samples, []
         seen = self._interpreter.perception
         for transport, sample in samples:
-            if transport == HAND_LINK and seen.ready and self._is_due(HAND_LINK, stamp_ns):
-                yield from self._story.state(stamp_ns, seen.joints_rad, seen.base_q)
+            if transport == HAND_LINK and seen.hand.ready and self._is_due(HAND_LINK, stamp_ns):
+                yield from self._story.state(stamp_ns, seen.hand.joints_rad, seen.hand.base_q)
             elif transport == CAMERA_LINK:
                 self._found = sample.detection
             elif transport.startswith("ft/"):

@@ -167,7 +167,7 @@ class DiscWorld:
     def _carry(self) -> None:
         if self._held_from is None or self.disc is None:
             return
-        palm = self.perception.world_T_palm
+        palm = self.perception.hand.world_T_palm
         motion = palm * self._held_from.inverse()
         self.disc.centre_m = np.asarray(motion.transformFrom(np.array([*self.disc.centre_m, 0.0])))[:2]
         self._held_from = palm
@@ -176,7 +176,7 @@ class DiscWorld:
 
     def _tip_m(self, finger: str) -> Array:
         # Asked for at every cycle: the perception's own way makes the poses of all five fingers for each of them.
-        frame = self.perception._placement.current().world_T_distal[FINGERS.index(finger)]
+        frame = self.perception.hand.current().world_T_distal[FINGERS.index(finger)]
         return np.asarray(frame[:3, :3] @ TIP_CENTRE_m + frame[:3, 3])
 
     def outward(self, finger: str) -> Array:
@@ -233,7 +233,7 @@ class DiscWorld:
 
     def begin_hold(self) -> None:
         self._mark(EventKind.HOLD_BEGIN)
-        self._held_from = self.perception.world_T_palm
+        self._held_from = self.perception.hand.world_T_palm
 
     def end_hold(self) -> None:
         self._mark(EventKind.HOLD_END)
@@ -262,7 +262,7 @@ class DiscWorld:
 
     def snapshot(self) -> CycleSnapshot:
         seen = self.perception
-        return CycleSnapshot(self.clock.now_ns(), seen.hand_stamp_ns, seen.loads_N(), seen.palm_world_m)
+        return CycleSnapshot(self.clock.now_ns(), seen.hand_stamp_ns, seen.loads_N(), seen.hand.palm_world_m)
 
     def report_stop(self, cause: str, cycles: list[dict[str, object]]) -> None:
         self.stop_reports.append((cause, len(cycles)))

@@ -235,7 +235,7 @@ class Toucher:
         ahead = np.asarray(frame.pose.rotation().rotate(direction_grasp))
         met = [finger for finger, load_N in self._motion.loads_N().items() if load_N > self.settings.met_N / 2]
         surface = TipSurface.upright(self._hand.semi_axes_m, self._hand.centre_distal_m)
-        frames = self._motion.runtime.perception.world_T_distal
+        frames = self._motion.runtime.perception.hand.world_T_distal
         return np.array([surface.leading_point(frames[f].matrix(), ahead) for f in met]).reshape(-1, 3)
 
     @property
@@ -259,7 +259,7 @@ class Toucher:
             motion.set_base(q)
             motion.tick()
             if self.guard.is_met():
-                motion.set_base(motion.runtime.perception.base_q)
+                motion.set_base(motion.runtime.perception.hand.base_q)
                 return True
         return False
 
@@ -283,7 +283,11 @@ class Toucher:
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         force_N = force_N if len(rates) > 1 else max(force_N, s.alone_N)
         gone_m = dict.fromkeys(rates, 0.0)
-        start, sunk_m, step_m = motion.runtime.perception.base_q.copy(), 0.0, 2.0 * sink_m / motion.cycles(s.press_s)
+        start, sunk_m, step_m = (
+            motion.runtime.perception.hand.base_q.copy(),
+            0.0,
+            2.0 * sink_m / motion.cycles(s.press_s),
+        )
         way = np.zeros(6)
         way[:3] = motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
         for _ in motion.shares(s.press_s):

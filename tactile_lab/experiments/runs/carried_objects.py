@@ -96,7 +96,7 @@ class CarryWatch(NullProgress):
     def phase(self, number: int, name: str) -> None:
         """Note what was felt, once the carry has ended."""
         if name == "squeeze":
-            self._palm_before = self._runtime.perception.world_T_palm
+            self._palm_before = self._runtime.perception.hand.world_T_palm
         if name == "re-orient":
             self._carried = (0, {})
         if name == "release" and self._carried is not None:
@@ -131,7 +131,7 @@ class CarryWatch(NullProgress):
         if held.carry is None or held.samples is None:
             return {}
         rng = np.random.default_rng([self._seed, len(self._grasped)])
-        palm = planar(self._runtime.perception.world_T_palm * self._palm_before.inverse())
+        palm = planar(self._runtime.perception.hand.world_T_palm * self._palm_before.inverse())
         spoilt = {
             how: held.odometry.estimate(spoil(held.samples, how, held.fingertips, rng))
             for how in SPOILT

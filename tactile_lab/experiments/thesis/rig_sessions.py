@@ -130,9 +130,9 @@ class _TruthWatch(NullProgress):
             self._moved = Pose3()
         self._captured = name == "capture"
         if name == "re-orient":
-            self._held_at = self._runtime.perception.world_T_palm
+            self._held_at = self._runtime.perception.hand.world_T_palm
         if name == "release" and self._held_at is not None:
-            self._moved = self._runtime.perception.world_T_palm * self._held_at.inverse()
+            self._moved = self._runtime.perception.hand.world_T_palm * self._held_at.inverse()
             self._held_at = None
 
 

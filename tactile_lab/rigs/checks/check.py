@@ -174,7 +174,7 @@ def _hand(runtime: RigRuntime, watch: StreamWatch, share: float) -> Finding:
 
 
 def _base(runtime: RigRuntime, watch: StreamWatch, share: float) -> Finding:
-    place = ", ".join(f"{value:.3f}" for value in runtime.perception.base_q[:3])
+    place = ", ".join(f"{value:.3f}" for value in runtime.perception.hand.base_q[:3])
     figures = watch.figures(BASE_LINK)
     problems, remarks = told_losses(_problems(runtime.base), share)
     identity = runtime.base.identity if isinstance(runtime.base, NamedInstrument) else ""

@@ -130,7 +130,7 @@ class SampledSession:
         traffic, due_ns = self._session.traffic(), -1
         for message in traffic.messages():
             clock_ns = self._interpreter.clock.now_ns()
-            if self._seen.ready and due_ns < 0:
+            if self._seen.hand.ready and due_ns < 0:
                 due_ns = clock_ns
             while 0 <= due_ns < clock_ns:
                 yield self._moment(due_ns)
@@ -140,7 +140,7 @@ class SampledSession:
     def _moment(self, stamp_ns: int) -> Moment:
         seen = self._seen
         counts = {finger: biotac_counts(seen.fingertips[finger]) or {} for finger in self.channels}
-        positions = self.robot.positions(seen.joints_rad, seen.base_q)
+        positions = self.robot.positions(seen.hand.joints_rad, seen.hand.base_q)
         return replace(self._now, stamp_ns=stamp_ns, positions=positions, loads_N=seen.loads_N(), counts=counts)
 
     def _take(self, message: TrafficMessage, where: str) -> None:

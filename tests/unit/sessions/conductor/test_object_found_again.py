@@ -23,7 +23,7 @@ class Falling:
         self.after, self.fell = after, False
 
     def __call__(self, world: DiscWorld) -> None:
-        away = world.event_counts[EventKind.CAPTURE_END] == 2 and world.perception.palm_world_m[2] > 0.30
+        away = world.event_counts[EventKind.CAPTURE_END] == 2 and world.perception.hand.palm_world_m[2] > 0.30
         if away and not self.fell:
             world.disc, self.fell = self.after, True
 

@@ -24,7 +24,7 @@ class Held:
     def __init__(self, joints_deg: Callable[[int], dict[str, float]], cycle_ns: int = 10_000_000) -> None:
         self.cycle_ns, self.cycles, self.stopped = cycle_ns, 0, False
         self._joints_deg = joints_deg
-        self.perception = SimpleNamespace(joints_rad=np.zeros(len(JOINTS)))
+        self.perception = SimpleNamespace(hand=SimpleNamespace(joints_rad=np.zeros(len(JOINTS))))
 
     def stop(self) -> None:
         self.stopped = True
@@ -34,7 +34,7 @@ class Held:
         for joint, degrees in self._joints_deg(self.cycles).items():
             angles[JOINT_INDEX[joint]] = np.radians(degrees)
         self.cycles += 1
-        self.perception.joints_rad = angles
+        self.perception.hand.joints_rad = angles
 
 
 def test_angles_are_the_mean_of_half_a_second_of_a_hand_that_rests() -> None:

@@ -85,7 +85,7 @@ def test_a_grasp_carries_the_ways_of_touching_and_of_missing_fingers():
     perception = make_perception(tip_surfaces=TIPS)
     hear(perception, OPEN_rad)
     perception.event(SessionEvent(EventKind.CLOSE_BEGIN, 0))
-    begun = perception.world_T_distal
+    begun = perception.hand.world_T_distal
     grasp = capture(perception, ["FF", "TH"])
     assert {line.finger: line.touched for line in grasp.approach_paths} == {f: f in {"FF", "TH"} for f in FINGERS}
     for line in grasp.approach_paths:

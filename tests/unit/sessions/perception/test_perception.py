@@ -56,11 +56,13 @@ def expected_palm(perception, joints_rad=BEND_rad, base_q=BASE_q):
 def test_frames_follow_mount_positioner_wrist_and_fingers():
     perception = make_perception()
     hear(perception)
-    assert perception.world_T_palm.equals(expected_palm(perception), 1e-12)
+    assert perception.hand.world_T_palm.equals(expected_palm(perception), 1e-12)
     for finger, palm_T_tip in palm_T_distal(BEND_rad).items():
         world_T_distal = expected_palm(perception) * palm_T_tip
-        assert perception.world_T_distal[finger].equals(world_T_distal, 1e-12)
-        np.testing.assert_allclose(perception.world_R_distal(finger), world_T_distal.rotation().matrix(), atol=1e-12)
+        assert perception.hand.world_T_distal[finger].equals(world_T_distal, 1e-12)
+        np.testing.assert_allclose(
+            perception.hand.world_R_distal[finger], world_T_distal.rotation().matrix(), atol=1e-12
+        )
 
 
 def test_a_contact_is_placed_in_the_world_through_its_finger():
@@ -70,7 +72,7 @@ def test_a_contact_is_placed_in_the_world_through_its_finger():
     assert [contact.finger for contact in result.contacts] == list(FINGERS)
     assert result.stamp_ns == 1050
     for contact in result.contacts:
-        world_T_distal = perception.world_T_distal[contact.finger]
+        world_T_distal = perception.hand.world_T_distal[contact.finger]
         shift = 1e-3 * 1e-3 * world_T_distal.rotation().matrix()[2]
         expected = world_T_distal.transformFrom(np.array([0.0, -0.007, 0.02]) + shift)
         np.testing.assert_allclose(contact.point_world_m, expected, atol=1e-12)
@@ -159,17 +161,17 @@ def test_dropped_fingers_are_counted_with_their_reason():
     hear(perception)
     result = grasp(perception, fingers=("FF", "MF", "TH"))
     assert [contact.finger for contact in result.contacts] == ["FF", "MF", "TH"]
-    assert perception.dropped == {"RF": "no contact", "LF": "no contact"}
+    assert perception.touches.dropped == {"RF": "no contact", "LF": "no contact"}
     grasp(perception)
-    assert perception.dropped == {}
-    assert perception.drop_counts == {"no contact": 2}
+    assert perception.touches.dropped == {}
+    assert perception.touches.drop_counts == {"no contact": 2}
 
 
 def test_a_touch_below_the_minimum_force_is_no_contact():
     perception = make_perception(force_N=0.05, settings=PerceptionSettings(minimum_force_N=0.1))
     hear(perception)
     assert grasp(perception).contacts == ()
-    assert perception.drop_counts == {"force below the minimum": 5}
+    assert perception.touches.drop_counts == {"force below the minimum": 5}
 
 
 def test_without_joint_angles_in_the_capture_there_are_no_contacts():
@@ -178,7 +180,7 @@ def test_without_joint_angles_in_the_capture_there_are_no_contacts():
     tell(perception, EventKind.CAPTURE_BEGIN)
     touch(perception)
     assert tell(perception, EventKind.CAPTURE_END).contacts == ()
-    assert set(perception.dropped.values()) == {"no joint angles during the capture"}
+    assert set(perception.touches.dropped.values()) == {"no joint angles during the capture"}
 
 
 def test_hand_motion_composes_all_holds_since_the_last_grasp():
@@ -230,11 +232,11 @@ def test_a_tare_reaches_the_named_fingers_and_reports_refusals():
     perception = make_perception()
     hear(perception)
     touch(perception, ["FF"])
-    assert perception.load_N("FF") > 0
+    assert perception.loads_N()["FF"] > 0
     report = tell(perception, EventKind.TARE, fingers=("FF", "TH"))
     assert isinstance(report, TareReport)
     assert set(report.refused) == {"TH"}
-    assert perception.load_N("FF") == pytest.approx(0.0, abs=1e-12)
+    assert perception.loads_N()["FF"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_loads_are_known_for_every_fingertip():
@@ -271,7 +273,7 @@ def test_an_end_without_a_beginning_is_refused(kind):
 @pytest.mark.parametrize("kind", [EventKind.CAPTURE_BEGIN, EventKind.HOLD_BEGIN, EventKind.TARE])
 def test_marks_before_the_first_samples_name_the_silent_device(kind):
     perception = make_perception()
-    assert not perception.ready
+    assert not perception.hand.ready
     with pytest.raises(DeviceError, match="hand: no joint angles"):
         tell(perception, kind)
     perception.on_hand(FakeHandSample(0, BEND_rad))

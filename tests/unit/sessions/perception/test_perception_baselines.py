@@ -185,7 +185,7 @@ def test_a_session_of_fakes() -> None:
         "undecodable": dict(interpreter.undecodable),
         "newest": {name: heard.stamp_ns for name, heard in interpreter.newest.items()},
         "loads": seen.loads_N(),
-        "dropped": [seen.dropped, dict(seen.drop_counts)],
+        "dropped": [seen.touches.dropped, dict(seen.touches.drop_counts)],
         "counts": [seen.grasp_count, seen.is_holding, interpreter.clock.now_ns(), seen.hand_stamp_ns],
         "motion": seen.hand_motion_world.matrix()[:3],
         "losses": dict(rig.runtime.losses),

@@ -41,7 +41,7 @@ def test_replayed_grasps_are_bit_equal_to_the_live_ones(tmp_path, seed, damage):
     assert interpreter.undecodable == rig.interpreter.undecodable
     assert bool(interpreter.undecodable) == bool(damage)
     assert interpreter.clock.now_ns() == rig.interpreter.clock.now_ns()
-    assert interpreter.perception.joints_rad.tobytes() == rig.runtime.perception.joints_rad.tobytes()
+    assert interpreter.perception.hand.joints_rad.tobytes() == rig.runtime.perception.hand.joints_rad.tobytes()
     assert interpreter.perception.loads_N() == rig.runtime.perception.loads_N()
     assert not loss
 
@@ -104,7 +104,7 @@ def test_a_session_folder_replays(tmp_path):
 def test_links_that_the_rig_does_not_know_are_left_alone():
     interpreter = make_interpreter()
     interpreter.on_received("ft/XX", b"anything", 5)
-    assert not interpreter.perception.ready
+    assert not interpreter.perception.hand.ready
     assert not interpreter.undecodable
 
 

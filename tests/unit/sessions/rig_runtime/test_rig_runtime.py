@@ -35,7 +35,7 @@ class Truth:
 def test_connecting_waits_until_hand_and_positioner_have_answered():
     rig = make_rig(unsteady=False)
     rig.runtime.connect()
-    assert rig.runtime.perception.ready
+    assert rig.runtime.perception.hand.ready
     assert [call for call in rig.calls if call.startswith("connect")][:2] == ["connect hand", "connect base"]
     rig.runtime.close()
 
@@ -166,7 +166,7 @@ def test_a_recorder_that_fails_stops_the_cycle_before_anything_is_understood():
     rig = make_rig(Recorder(FullAfter()))
     with pytest.raises(SessionError, match="the disk is full"):
         rig.runtime.connect()
-    assert not rig.runtime.perception.ready
+    assert not rig.runtime.perception.hand.ready
 
 
 @pytest.mark.parametrize("room", [50, 51, 52, 53, 54])

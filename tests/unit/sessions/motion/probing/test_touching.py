@@ -138,7 +138,7 @@ def test_a_hand_that_waited_for_a_pressed_finger_goes_on_from_there(monkeypatch:
         heights.append(float(q[2]))
 
     table, frame = closing(TAP.closing, TAP_HEIGHT_m, TIP), GraspFrame(0.0, 0.0, 0.0)
-    start = float(motion.runtime.perception.base_q[2])
+    start = float(motion.runtime.perception.hand.base_q[2])
     monkeypatch.setattr(motion, "set_base", set_base)
     monkeypatch.setattr(motion, "loads_N", loads_N)
     monkeypatch.setattr(motion, "tick", lambda: heights.append(heights[-1] if heights else start))

@@ -77,4 +77,4 @@ def test_a_bench_names_the_link_that_jumped_once_and_counts_what_its_hand_lost()
     rig.runtime.close()
     assert heard == ["base: its stamps are 10.0 s ahead of all others', its clock has jumped"]
     assert rig.runtime.losses == {"lost cycles hand": 3, "clock jumps base": 1}
-    assert np.isfinite(rig.runtime.perception.base_q).all()
+    assert np.isfinite(rig.runtime.perception.hand.base_q).all()
