@@ -152,9 +152,11 @@ def load_data(path: Path) -> ForearmData:
         raise ConfigurationError("contains no known kind of observations", where=str(path), hint=hint)
     file = validate(content, DataFile, where=str(path))
     if bool(file.touches) == bool(file.views):
-        raise ConfigurationError("needs either touches or views", where=str(path))
+        hint = "Keep one kind in the file; record the other with another run of the wizard"
+        raise ConfigurationError("needs either touches or views", where=str(path), hint=hint)
     if file.views and (file.camera is None or file.markers is None):
-        raise ConfigurationError("views need camera and markers", where=str(path))
+        hint = "Add the camera's lens and the markers' sizes, as the wizard records them"
+        raise ConfigurationError("views need camera and markers", where=str(path), hint=hint)
     form = HandForm(file.side, file.driven)
     return ForearmData(
         rig=file.rig,
@@ -239,7 +241,8 @@ def _touch_entry(touch: Touch) -> TouchEntry:
         normal = _three(target.normal_world)
         entry = PlaneEntry(name=target.name, point_world_m=place, normal_world=normal, sigma_m=target.sigma_m)
     if touch.finger not in FINGERS:
-        raise ConfigurationError(f"unknown finger {touch.finger}")
+        hint = f"Fingers: {', '.join(FINGERS)}"
+        raise ConfigurationError(f"unknown finger {touch.finger}", where="touches", hint=hint)
     return TouchEntry.model_validate(
         {
             "finger": touch.finger,

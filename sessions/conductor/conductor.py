@@ -137,7 +137,7 @@ class Conductor:
         if self._find is None:
             return Ending.OBJECT_LOST, lost(search.reason, self._grasps)
         self._tell(Level.WARNING, f"{search.reason}: the object is looked for")
-        self._phase("bounding box")
+        self._phase("search")
         box = self._find(lambda: self._guard.requested, search.places_m, search.top_m)
         if self._guard.requested:
             return None

@@ -194,8 +194,9 @@ class AutonomousDecisions:
     def __init__(self, estimator: EstimatorClient) -> None:
         self.estimator = estimator
         self._planned: PlannedGrasp | None = None
+        """The planner's last decision."""
         self._centre_m: Array | None = None
-        """The planner's decision; None after new information has reached it."""
+        """Where the planner expects the object; None after a grasp, until it is asked."""
 
     @property
     def centre_m(self) -> Array:

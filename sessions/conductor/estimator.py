@@ -94,7 +94,7 @@ class Estimator(Protocol):
         """
 
     def undo(self, hand_motion_world: Pose3) -> None:
-        """Undo the last grasp. ``carried`` is how the hand carried the object since the grasp before it."""
+        """Undo the last grasp. ``hand_motion_world`` is how the hand carried the object since the grasp before it."""
 
     def describe_unknown(self) -> str:
         """Which part of the object is still unknown, as a sentence for the operator."""
@@ -116,7 +116,7 @@ class PolicyChoice(Protocol):
         """What is wrong with the policy itself; empty while its answers are valid."""
 
     def as_plain(self) -> dict[str, Any]:
-        """The whole decision as plain data, for the recording (topic ``/policy/decision``)."""
+        """The whole decision as plain data, for the recording (topic ``/decision``)."""
 
     def sentence(self) -> str:
         """The decision in one line, for people."""

@@ -88,7 +88,7 @@ def worth(rows: Sequence[Row], name: str) -> str:
     """
     parts = [_loss(rows, name, condition) for condition in (PLANE, WRONG, SPACE)]
     if {UNKNOWN, _NOTHING}.issuperset(parts):
-        for condition in (THINGS, BIASED, LEFT, LONG):
+        for condition in (THINGS, BIASED, CARRIED, LEFT, LONG):
             if (part := _loss(rows, name, condition)) != UNKNOWN:
                 return f"{part} {condition}"
     return " / ".join(parts)

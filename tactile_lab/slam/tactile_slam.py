@@ -140,12 +140,20 @@ class TactileSlam:
         return len(self._steps)
 
     @on_one_thread
-    def step(self, grasp: Grasp) -> SlamStep:
+    def add_grasp(self, grasp: Grasp) -> SlamStep:
         """Add one grasp (algorithm 3.1, then the graph).
 
-        Raises:
-            TrackingError: the grasp has entries that are not finite, or wrong units; nothing was changed.
+        One that has entries that are not finite, or wrong units, counts as one without contacts; its step says why.
         """
+        try:
+            return self._step(grasp)
+        except TrackingError as error:
+            step = self._step(replace(grasp, contacts=()))
+            self._steps[-1] = replace(step, reason=str(error))
+            return self._steps[-1]
+
+    def _step(self, grasp: Grasp) -> SlamStep:
+        """Raises TrackingError: the grasp has entries that are not finite, or wrong units; nothing was changed."""
         started = time.perf_counter()
         if grasp.begins_anew:
             self._begin_anew()
@@ -160,15 +168,6 @@ class TactileSlam:
         self._tracker.resample()
         self._tracker.adopt(self._back_end.close_loops(self._tracker.map))
         return self._record(grasp, contacts, verdict, reason, started)
-
-    def add_grasp(self, grasp: Grasp) -> SlamStep:
-        """As :meth:`step`, but an invalid grasp counts as one without contacts; its step says why."""
-        try:
-            return self.step(grasp)
-        except TrackingError as error:
-            step = self.step(replace(grasp, contacts=()))
-            self._steps[-1] = replace(step, reason=str(error))
-            return self._steps[-1]
 
     @on_one_thread
     def finish(self) -> SlamResult:

@@ -46,7 +46,7 @@ def result_of(dimension: Literal[2, 3]) -> SlamResult:
     """The default method's result for :func:`box_grasps`, computed once for all tests."""
     slam = TactileSlam(SlamSettings(dimension=dimension, mesh_resolution_m=0.006), seed=3)
     for grasp in box_grasps().grasps:
-        slam.step(grasp)
+        slam.add_grasp(grasp)
     return slam.finish()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from importlib.metadata import version
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -49,8 +49,9 @@ def test_everything_that_is_public_can_be_had_and_stands_in_the_reference_as_it_
     assert public_api.PAGE.read_text() == public_api.page(), "run: python -m tests.support.public_api"
 
 
-def test_the_version_is_that_of_the_installation() -> None:
-    assert tactile_lab.__version__ == version("tactile-lab")
+def test_the_version_is_that_of_the_project() -> None:
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    assert tactile_lab.__version__ == project["version"]
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = tactile_lab.nothing
 

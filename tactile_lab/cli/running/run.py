@@ -179,9 +179,19 @@ def run(
     viewers = LiveAddress.if_wanted(live, rig, live_port, token, live_origin)
     way = GuidedWay(_leader(led_by), automatic_capture or None, pedal, 1.0 if pace is None else pace, no_input)
     request = SessionRequest(
-        rig, object_name, out, method, dimension, seed, grasps, notes, allow_uncalibrated, policy, bounding_box
+        rig=rig,
+        object_name=object_name,
+        root=out,
+        method=method,
+        dimension=dimension,
+        seed=seed,
+        grasps=grasps,
+        notes=notes,
+        allow_uncalibrated=allow_uncalibrated,
+        policy=policy,
+        bounding_box=bounding_box,
+        weighings=weighings,
     )
-    request = replace(request, weighings=weighings)
     check_request(request)  # before a page is opened, or a terminal taken
     tell_left_open(out)
     title = f"{object_name} on rig {rig}: {dimension}-D, method {method}, seed {seed}"

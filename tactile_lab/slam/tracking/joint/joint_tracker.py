@@ -177,7 +177,7 @@ class JointTracker:
         return PoseEstimate(best.pose, best.covariance + spread)
 
     def update_shape(self, contacts: ContactSet, certain: bool) -> None:
-        """Nothing to do: the branches contain the new contacts already."""
+        """The branches contain the contacts; the last grasp gets the covariance with the spread of hypotheses."""
         best = self._branches[0]
         last = replace(best.map.placed[-1], covariance=self.estimate().covariance)
         self._branches[0] = replace(best, map=replace(best.map, placed=(*best.map.placed[:-1], last)))

@@ -41,7 +41,7 @@ def touched(points_m: np.ndarray, normals: np.ndarray, shape_model: str = "auto"
     settings = SlamSettings.model_validate({"method": "known-pose", "dimension": 3, "shape_model": shape_model})
     slam = TactileSlam(settings, 0, [Pose3()] * len(grasps))
     for grasp in grasps:
-        slam.step(grasp)
+        slam.add_grasp(grasp)
     return slam
 
 

@@ -30,7 +30,7 @@ ELL_AREA_m2 = 0.10 * 0.03 + 0.03 * 0.03
 def run_slam(recorded: Recorded, dimension: int) -> SlamResult:
     slam = TactileSlam(SlamSettings(dimension=dimension), seed=3)
     for grasp in recorded.grasps:
-        slam.step(grasp)
+        slam.add_grasp(grasp)
     return slam.finish()
 
 

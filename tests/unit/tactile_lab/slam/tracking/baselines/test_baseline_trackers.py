@@ -25,7 +25,7 @@ def run(data: SimulatedGrasps, method: str, known=None, **changes: object) -> Sl
         SlamSettings.model_validate({"method": method, "contour_resolution_m": 0.002, **changes}), 0, known
     )
     for grasp in data.grasps:
-        slam.step(grasp)
+        slam.add_grasp(grasp)
     return slam.finish()
 
 
@@ -97,10 +97,10 @@ def test_registration_finds_a_small_motion_of_a_well_known_object() -> None:
     data = simulate("rectangle", 1, count=10, motion_scale=0.0)
     slam = TactileSlam(SlamSettings(method="icp"))
     for grasp in data.grasps:
-        slam.step(grasp)
+        slam.add_grasp(grasp)
     last = data.grasps[-1]
     away = spatial(Pose2(0.004, -0.003, 0.03))
-    slam.step(replace(last, index=10, hand_motion_world=away.inverse()))
+    slam.add_grasp(replace(last, index=10, hand_motion_world=away.inverse()))
     found = slam.finish().world_T_object[-2:]
     between = planar(found[0].between(found[1]))
     assert np.hypot(between.x(), between.y()) < 0.004
@@ -123,8 +123,8 @@ def square(larger_by_m: float = 0.0) -> Grasp:
 def covariance_after(second: Grasp) -> tuple[Array, Array]:
     """Of a pose registered to a grasp of the square, and before: by odometry alone."""
     slam = TactileSlam(SlamSettings(method="icp"))
-    first = slam.step(square())
-    step = slam.step(replace(second, index=1))
+    first = slam.add_grasp(square())
+    step = slam.add_grasp(replace(second, index=1))
     assert step.verdict == "tracked"
     return step.covariance, first.covariance + np.diag([0.01**2, 0.01**2, np.deg2rad(20.0) ** 2])
 
@@ -148,9 +148,9 @@ def test_contacts_that_do_not_fit_the_map_tell_as_little_as_they_are_off() -> No
 
 def test_registration_of_contacts_far_from_all_others_leaves_odometry_and_stays_out_of_the_shape() -> None:
     slam = TactileSlam(SlamSettings(method="icp"))
-    slam.step(DATA.grasps[0])
+    slam.add_grasp(DATA.grasps[0])
     far = [replace(one, point_world_m=one.point_world_m + np.array([0.3, 0.0, 0.0])) for one in DATA.grasps[1].contacts]
-    step = slam.step(replace(DATA.grasps[1], contacts=tuple(far), hand_motion_world=Pose3()))
+    step = slam.add_grasp(replace(DATA.grasps[1], contacts=tuple(far), hand_motion_world=Pose3()))
     assert (step.verdict, step.contacts_used) == ("untracked", 0)
 
 

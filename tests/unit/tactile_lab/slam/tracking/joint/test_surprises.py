@@ -54,8 +54,8 @@ def then_touched(places: list[Touch], seed: int, motion: dict[str, float], **joi
     rng = np.random.default_rng(seed)
     given = {"method": "joint", "dimension": 3, "motion": motion, "joint": joint}
     slam = TactileSlam(SlamSettings.model_validate(given), seed)
-    slam.step(touched(AROUND + MIDDLE, 0, rng))
-    return slam.step(touched(places, 1, rng))
+    slam.add_grasp(touched(AROUND + MIDDLE, 0, rng))
+    return slam.add_grasp(touched(places, 1, rng))
 
 
 @pytest.mark.parametrize("seed", [1, 4, 6])
@@ -82,8 +82,8 @@ def test_fingers_that_only_touched_are_believed_beside_an_edge_too(seed: int) ->
     for probed in (False, True):
         rng = np.random.default_rng(seed)
         slam = TactileSlam(SlamSettings.model_validate({"method": "joint", "dimension": 3, "motion": LEFT}), seed)
-        slam.step(touched(WALLS, 0, rng))
+        slam.add_grasp(touched(WALLS, 0, rng))
         tap = touched(NEAR_THE_EDGE, 1, rng)
-        step = slam.step(replace(tap, contacts=tuple(replace(each, probed=probed) for each in tap.contacts)))
+        step = slam.add_grasp(replace(tap, contacts=tuple(replace(each, probed=probed) for each in tap.contacts)))
         used.append(step.contacts_used)
     assert used == [0, len(NEAR_THE_EDGE)]

@@ -31,7 +31,7 @@ def test_an_object_that_a_closing_hand_turned_is_followed(turn_deg: float) -> No
     for index, palm in enumerate(PALMS):
         if index == PUSHED_AT:
             where = where.compose(Pose2(0.006, 0.002, float(np.deg2rad(turn_deg))))
-        step = slam.step(hand.grasp(index, palm, where))
+        step = slam.add_grasp(hand.grasp(index, palm, where))
         assert step.verdict in ("first", "tracked"), (index, step.reason)
         assert slam.world_T_object is not None
         errors_deg.append(np.rad2deg(planar(slam.world_T_object).rotation().theta() - where.rotation().theta()))
@@ -49,10 +49,10 @@ def test_a_push_is_looked_for_only_where_a_grasp_on_an_object_left_lying_fits_ba
     motion = MOTION | {"unheld": unheld}
     slam = TactileSlam(SlamSettings.model_validate({"method": "joint", "dimension": 2, "motion": motion}), seed=4)
     for index, palm in enumerate(PALMS[:3]):
-        slam.step(hand.grasp(index, palm, Pose2()))
+        slam.add_grasp(hand.grasp(index, palm, Pose2()))
     asked, propose = [], deferred_association.propose
     monkeypatch.setattr(deferred_association, "propose", lambda *given: asked.append(given) or propose(*given))
-    slam.step(hand.grasp(3, PALMS[3], Pose2(0.006, 0.002, float(np.deg2rad(turn_deg)))))
+    slam.add_grasp(hand.grasp(3, PALMS[3], Pose2(0.006, 0.002, float(np.deg2rad(turn_deg)))))
     assert bool(asked) is is_asked
 
 
