@@ -26,6 +26,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         planar.METHODS_2D,
         solids.METHODS_3D,
         solids.EVERYDAY,
+        solids.EVERYDAY_2D,
         solids.EVERYDAY_SHAPE,
         solids.KNOWN_SHAPE,
         solids.SOLID_LIMIT,

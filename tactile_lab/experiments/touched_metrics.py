@@ -17,11 +17,18 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array, Grasp
-from drivers.core.poses import rotate, transform_points
+from drivers.core.poses import rotate, spatial, transform_points
 from drivers.shadow.closing.posture import HandShape
+from tactile_lab.experiments.data.planar_data import PlanarGrasps
+from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.shape.metrics.alignment import align_meshes
-from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh_with_normals
+from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
+from tactile_lab.slam.shape.surfaces.sampling import (
+    distances_to_mesh,
+    distances_to_polygon,
+    sample_mesh_with_normals,
+    sample_polygon,
+)
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 REACH_m = 0.015
@@ -43,6 +50,7 @@ _FACING_AWAY = -0.5
 _UNDERSIDE = -0.9
 _LARGEST_EDGE_m = 0.004
 _SAMPLES = 20_000
+_STEP_m = 0.0005
 
 
 class Touched(Protocol):
@@ -101,6 +109,29 @@ def touched_figures(data: Touched, result: Estimated) -> dict[str, Any]:
     }
 
 
+def touched_outline_figures(data: PlanarGrasps, result: SlamResult) -> dict[str, Any]:
+    """As :func:`touched_figures` in the plane: of points within :data:`REACH_m` of a contact, after the best fit of the
+    whole outlines.
+    """
+    estimate, field = result.contour, result.surface
+    if estimate is None or field is None:
+        return dict(NOTHING_TOUCHED)
+    fit = spatial(align_contours(estimate.points_m, data.outline_m))
+    outline_m, contacts_m = _flat(fit, estimate.points_m), _flat(fit, field.contacts_m)
+    touched_m = np.vstack([_flat(pose.inverse(), grasp.points_world_m) for grasp, pose in _placed(data)])
+    truth_m = sample_polygon(data.outline_m, _STEP_m)
+    is_near = cKDTree(touched_m).query(truth_m)[0] <= REACH_m
+    told = cKDTree(contacts_m).query(outline_m)[0] <= REACH_m
+    errors_m, sigma_m = distances_to_polygon(outline_m[told], data.outline_m), estimate.sigma_m[told]
+    there_m = distances_to_polygon(truth_m[is_near], outline_m)
+    return {
+        "touched_hausdorff_mm": 1e3 * float(max(there_m.max(), errors_m.max())),
+        "touched_mean_mm": 1e3 * float(there_m.mean() + errors_m.mean()) / 2,
+        "touched_within_2_sigma": float(np.mean(errors_m <= 2 * sigma_m)),
+        "touched_share": float(np.mean(is_near)),
+    }
+
+
 def known_share(estimate: SurfaceMesh | None, truth: trimesh.Trimesh) -> float:
     """Share of the surface in a fingertip's reach where the model is within :data:`KNOWN_m`, at the best fit, and says
     so with two standard deviations; 0 without a model.
@@ -147,11 +178,22 @@ class _Contacts:
 
 def _true_contacts(data: Touched) -> _Contacts:
     """The measured contacts, placed by the true poses."""
-    pairs = [(pose.inverse(), grasp) for pose, grasp in zip(data.world_T_body, data.grasps, strict=True)]
-    pairs = [(pose, grasp) for pose, grasp in pairs if grasp.contacts]
+    pairs = [(pose.inverse(), grasp) for grasp, pose in _placed(data)]
     points = [transform_points(pose, grasp.points_world_m) for pose, grasp in pairs]
     normals = [rotate(pose, np.array([contact.normal_world for contact in grasp.contacts])) for pose, grasp in pairs]
     return _Contacts(np.vstack(points), np.vstack(normals))
+
+
+def _placed(data: Touched | PlanarGrasps) -> list[tuple[Grasp, Pose3]]:
+    """The grasps with contacts, and where the object was."""
+    pairs = zip(data.grasps, data.world_T_body, strict=True)
+    return [(grasp, pose) for grasp, pose in pairs if grasp.contacts]
+
+
+def _flat(transform: Pose3, points_m: Array) -> Array:
+    """Points of shape (n, 2) or (n, 3) transformed within the plane, shape (n, 2)."""
+    level = np.pad(points_m[:, :2], ((0, 0), (0, 1)))
+    return np.asarray(transform_points(transform, level)[:, :2])
 
 
 def _divided(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -15,6 +15,7 @@ from gtsam import Pose2, Pose3
 from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
 from drivers.core.errors import ConfigurationError
 from drivers.core.poses import spatial
+from tactile_lab.evaluation.shape import horizontal_outline
 from tactile_lab.experiments.data.outlines import OUTLINES_m, first_crossing, random_boundary_points
 from tactile_lab.experiments.data.sensing import (
     IN_PLANE,
@@ -25,6 +26,7 @@ from tactile_lab.experiments.data.sensing import (
     measured_contact,
     planar_pose,
 )
+from tactile_lab.experiments.data.solids import solid
 from tactile_lab.slam.tracking.contacts.motion import vector_pose
 
 _FAN_rad = np.deg2rad([-75.0, -25.0, 25.0, 75.0, 180.0])
@@ -71,7 +73,25 @@ def simulate(
     Raises:
         ConfigurationError: there is no such shape.
     """
-    outline_m = outline(shape)
+    return simulate_outline(shape, outline(shape), seed, motion_scale, count, outlier_share)
+
+
+def simulate_section(shape: str, seed: int, *, height_share: float, motion_scale: float, count: int) -> PlanarGrasps:
+    """Grasps of a solid's outer outline at a share of its height, the middle of its extent at the origin.
+
+    Raises:
+        ConfigurationError: there is no such solid, or its mesh is not on this machine.
+    """
+    body = solid(shape)
+    outline_m = horizontal_outline(body.mesh, body.foot_m + height_share * body.height_m)
+    middle_m = (outline_m.min(axis=0) + outline_m.max(axis=0)) / 2
+    return simulate_outline(shape, outline_m - middle_m, seed, motion_scale, count)
+
+
+def simulate_outline(
+    shape: str, outline_m: Array, seed: int, motion_scale: float, count: int, outlier_share: float = 0.0
+) -> PlanarGrasps:
+    """As :func:`simulate`, of a given outline, shape (n, 2), counter-clockwise."""
     rng = np.random.default_rng([seed, 20261, round(1000 * motion_scale)])
     world_T_body = planar_pose(rng.normal(0.0, 0.05, 2), rng.uniform(-np.pi, np.pi))
     palm = world_T_body.compose(planar_pose(rng.normal(0.0, 0.006, 2), -world_T_body.theta() + rng.normal(0, 0.09)))

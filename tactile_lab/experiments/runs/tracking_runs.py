@@ -14,7 +14,7 @@ from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.experiments.data.sensing import SimulatedGrasps, SLIP_SIGMA_m, SLIP_SIGMA_rad
 from tactile_lab.experiments.run_metrics import contour_figures, slam_figures
-from tactile_lab.experiments.touched_metrics import touched_figures
+from tactile_lab.experiments.touched_metrics import touched_figures, touched_outline_figures
 from tactile_lab.slam.graph.faces import FaceSettings, assign_to_segments, contour_segments
 from tactile_lab.slam.graph.pose_graph import PoseGraphSettings, find_loops, optimise_poses
 from tactile_lab.slam.result import SlamResult
@@ -72,6 +72,17 @@ def track_everyday_thing(cell: Cell) -> dict[str, Any]:
     scale = cell["noise"] / 100
     data = spatial_data.simulate(cell["shape"], cell.seed, motion_scale=scale, count=cell["grasps"], heights="all")
     return _track(data, cell, dimension=3, figures=touched_figures)
+
+
+def track_everyday_section(cell: Cell) -> dict[str, Any]:
+    """Evaluate a method, where it was touched, on grasps of a thing's outline at a share of its height. Cell: shape,
+    height (percent), noise (percent), method, grasps.
+    """
+    share, scale = cell["height"] / 100, cell["noise"] / 100
+    data = planar_data.simulate_section(
+        cell["shape"], cell.seed, height_share=share, motion_scale=scale, count=cell["grasps"]
+    )
+    return _track(data, cell, dimension=2, figures=touched_outline_figures)
 
 
 def _track(

@@ -54,8 +54,12 @@ def _everyday_scans_left_out() -> str:
 
 
 def _everyday_things(grasps: int) -> list[Setting]:
-    shapes = (*HOUSEHOLD, *(() if _everyday_scans_left_out() else EVERYDAY_SCANS))
-    return grid(noise=[100], shape=shapes, method=("known-pose", "joint"), grasps=sorted({grasps, grasps * 3 // 2}))
+    shapes, counts = (*HOUSEHOLD, *(() if _everyday_scans_left_out() else EVERYDAY_SCANS)), {grasps, grasps * 3 // 2}
+    return grid(noise=[100, FELT_NOISE], shape=shapes, method=("known-pose", "joint"), grasps=sorted(counts))
+
+
+def _everyday_sections(grasps: int) -> list[Setting]:
+    return [(("height", 50), *setting) for setting in _everyday_things(grasps)]
 
 
 def _everyday_shapes(grasps: int) -> list[Setting]:
@@ -131,6 +135,19 @@ EVERYDAY = Experiment(
         FINISH,
     ),
     ranges("method", "Hausdorff distance where touched, mm", "touched_hausdorff_mm", lambda cell: str(cell["shape"])),
+    pooled=("shape",),
+    grasps=SPATIAL_GRASPS,
+    left_out=_everyday_scans_left_out,
+)
+
+EVERYDAY_2D = Experiment(
+    "everyday-2d",
+    "Outlines of everyday things at half their height, grasped in the plane: known poses against estimated ones, where "
+    "they were touched.",
+    _everyday_sections,
+    tracking_runs.track_everyday_section,
+    EVERYDAY.columns,
+    EVERYDAY.plot,
     pooled=("shape",),
     grasps=SPATIAL_GRASPS,
     left_out=_everyday_scans_left_out,

@@ -7,6 +7,7 @@ quarter of the contacts in turn is predicted from the rest.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 import trimesh
@@ -22,34 +23,60 @@ from tactile_lab.slam.shape.surfaces.surface import Indices, SurfaceMesh
 _WORST_nats = 30.0
 """Largest cost of a held-out contact: more than that of an outlier, or a whole rounded edge would count as outliers."""
 _PARTS = 4
+_NOTHING_nats = -1e4
+"""Of a solid that encloses nothing, beside another one."""
 _SETTLED_nats = 45.0
 """With this much evidence for or against, the remaining quarters are skipped."""
 
 
-def foretells_better(
-    fit: Callable[[Gpis], FittedShape], gpis: Gpis, resolution_m: float, floor_m: float | None
-) -> bool:
+Fit: TypeAlias = Callable[[Gpis], FittedShape]
+"""Makes a solid from the field of some of the contacts."""
+
+
+def foretells_better(fit: Fit, gpis: Gpis, resolution_m: float, floor_m: float | None) -> bool:
     """Whether a sharp solid predicts the contacts of a field better than the field does.
 
     Args:
-        fit: makes the solid from the field of some of the contacts.
+        fit: makes the solid.
         gpis: the field, its kernel at a maximum of the marginal likelihood.
         resolution_m: resolution of the solid's surface; its faces do not depend on it.
         floor_m: height of the table, if there is one.
     """
-    contacts = contacts_of(gpis)
-    advantage = 0.0
+
+    def advantage(held: Indices, rest: Indices) -> float:
+        return _foretold(fit, gpis, held, rest, resolution_m, floor_m) - gpis.log_density_given_others(held)
+
+    return _sum_over_parts(advantage, len(gpis.contacts_m)) > 0
+
+
+def foretells_better_than(fit: Fit, other: Fit, gpis: Gpis, resolution_m: float, floor_m: float | None) -> bool:
+    """Whether a solid predicts contacts better than another solid; arguments as of :func:`foretells_better`."""
+
+    def advantage(held: Indices, rest: Indices) -> float:
+        given = gpis, held, rest, resolution_m, floor_m
+        return max(_foretold(fit, *given), _NOTHING_nats) - max(_foretold(other, *given), _NOTHING_nats)
+
+    return _sum_over_parts(advantage, len(gpis.contacts_m)) > 0
+
+
+def _sum_over_parts(advantage: Callable[[Indices, Indices], float], count: int) -> float:
+    """The sum for each quarter held out and its rest, as far as it is not settled before."""
+    total = 0.0
     for part in range(_PARTS):
-        held = np.arange(part, len(contacts), _PARTS)
-        rest = np.setdiff1d(np.arange(len(contacts)), held)
-        try:
-            mesh = fit(gpis.of_some(rest)).mesh(resolution_m, floor_m)
-        except ShapeError:  # the rest does not enclose anything
-            return False
-        advantage += _log_density(contacts, held, mesh) - gpis.log_density_given_others(held)
-        if abs(advantage) > _SETTLED_nats:
+        held = np.arange(part, count, _PARTS)
+        total += advantage(held, np.setdiff1d(np.arange(count), held))
+        if abs(total) > _SETTLED_nats:
             break
-    return advantage > 0
+    return total
+
+
+def _foretold(fit: Fit, gpis: Gpis, held: Indices, rest: Indices, resolution_m: float, floor_m: float | None) -> float:
+    """Log density of held-out contacts on the solid of the rest; minus infinity if that does not enclose anything."""
+    try:
+        mesh = fit(gpis.of_some(rest)).mesh(resolution_m, floor_m)
+    except ShapeError:
+        return -np.inf
+    return _log_density(contacts_of(gpis), held, mesh)
 
 
 def _log_density(contacts: WeightedContacts, held: Indices, mesh: SurfaceMesh) -> float:

@@ -16,7 +16,7 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.model import FittedShape
-from tactile_lab.slam.shape.selection.held_out import foretells_better
+from tactile_lab.slam.shape.selection.held_out import foretells_better, foretells_better_than
 from tactile_lab.slam.shape.selection.unexplained import are_inside, unexplained
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
@@ -76,6 +76,7 @@ def best_spatial_shape(
     gpis, left_out_nats = (gpis, 0.0) if "strays" in without else _without_strays(gpis)
     if floor_m is not None and "standing field" not in without:
         field = _try_make(lambda: StandingField.fit(gpis, floor_m)) or field
+    sharp: Fit | None = None
     best, most = field, -np.inf if "field" in without else field.log_evidence or -np.inf
     for fit in _candidates(gpis.settings, best_outline, free_points_m, floor_m):
         shape = _try_make(lambda fit=fit: fit(gpis))  # type: ignore[misc]
@@ -83,13 +84,38 @@ def best_spatial_shape(
             continue
         evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
         if evidence > most and _earned(fit, evidence, gpis, floor_m):
-            best, most = shape, evidence
+            best, most, sharp = shape, evidence, fit
     if floor_m is None:
         return best
     if not _beyond_doubt(most, gpis) and without.isdisjoint({"field", "standing field", "sections"}):
-        best, most = _likelier(_sectioned(gpis, floor_m), best, most)
-    best = _revolving(everything, free_points_m, floor_m, at_least=most + left_out_nats) or best
+        best, most = _likelier(sectioned := _sectioned(gpis, floor_m), best, most)
+        sharp = None if best is sectioned else sharp
+    best = _rounder(best, sharp, everything, free_points_m, floor_m, most + left_out_nats)
     return _with_missing_parts(best, everything, free_points_m, floor_m)
+
+
+def _rounder(
+    best: FittedShape,
+    sharp: Fit | None,
+    gpis: Gpis,
+    free_points_m: Array | None,
+    floor_m: float,
+    evidence: float,
+) -> FittedShape:
+    """The solid of revolution if it has more evidence than the best so far, or if that is sharp and predicts contacts
+    worse: many small faces can follow a round wall.
+    """
+    if sharp is None:
+        return _revolving(gpis, free_points_m, floor_m, at_least=evidence) or best
+    round_ = _revolving(gpis, free_points_m, floor_m, at_least=-np.inf)
+    if round_ is None:
+        return best
+
+    def turn(some: Gpis) -> FittedShape:
+        fit = Turned.fit if isinstance(round_, Turned) else turned_with_parts
+        return fit(some, floor_m, free_points_m)
+
+    return best if foretells_better_than(sharp, turn, gpis, _COARSE_m, floor_m) else round_
 
 
 def _revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:

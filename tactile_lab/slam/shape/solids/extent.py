@@ -14,6 +14,7 @@ from tactile_lab.slam.shape.solids.planes import Planes
 
 _LEAST_COSINE_UP, _LEAST_COSINE_ASIDE = 0.5, 0.3
 """A side is open if no plane's normal has at least this component in the side's direction."""
+_LEVEL_COSINE = np.cos(np.deg2rad(30.0))
 _SPACING_m, _MARGIN_m = 0.007, 0.030
 _LEAST_SIGMA_m = 0.003
 _BISECTIONS = 12
@@ -39,7 +40,7 @@ class Cap:
 
 def open_sides(gpis: Gpis, planes: Planes, floor_m: float | None) -> tuple[Cap, ...]:
     """Caps for the sides that no plane bounds; a floor bounds the lower side. Empty if the field has no inside."""
-    sides = [side for side, least in _sides(planes, floor_m) if (planes.normals @ side).max() < least]
+    sides = [side for side, least in _sides(planes, floor_m) if _towards(planes, side) < least]
     if not sides:
         return ()
     inside_m = _inside(gpis)
@@ -63,6 +64,14 @@ def _inside(gpis: Gpis) -> Array:
     contacts = gpis.contacts_m
     grid = FieldGrid.tabulate(gpis, contacts.min(axis=0) - _MARGIN_m, contacts.max(axis=0) + _MARGIN_m, _SPACING_m)
     return np.asarray(grid.lower_m + _SPACING_m * np.argwhere(grid.values_m < 0))
+
+
+def _towards(planes: Planes, side: Array) -> float:
+    """Largest component in a side's direction of the normals of planes that can end the solid there: a slope that is
+    hardly steeper than a top comes down to the table far outside.
+    """
+    level = np.abs(planes.normals[:, 2]) > _LEVEL_COSINE
+    return float(np.where(level & (side[2] == 0), -1.0, planes.normals @ side).max())
 
 
 def _sides(planes: Planes, floor_m: float | None) -> list[tuple[Array, float]]:

@@ -18,7 +18,8 @@ from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.filter.particle_filter import CERTAIN_VARIANCE, PoseEstimate
-from tactile_lab.slam.tracking.joint.hypotheses import HypothesisScorer
+from tactile_lab.slam.tracking.joint.deferred_association import CLEARLY_nats
+from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
 from tactile_lab.slam.tracking.joint.proposals import UNEXPLAINED_COST
 
 _STEP = 1e-6
@@ -120,12 +121,21 @@ class KnownPoseTracker(OdometryTracker):
     def finish(self) -> None:
         """Test all contacts again with the final shape; leaving some out changes the kernel.
 
-        The initial kernel is that of the accepted contacts: wrong ones would shorten it to explain all.
+        The initial kernel is that of the accepted contacts: wrong ones would shorten it to explain all. That of all
+        contacts is taken where it is clearly more likely: what lies behind a thin wall does not fit a long one.
         """
-        kernel = self._map.with_best_kernel().settings
-        self._map, _ = self._scorer.clean(replace(self._map.with_all_contacts(), settings=kernel))
+        every = self._map.with_all_contacts()
+        found = self._tested(replace(every, settings=self._map.with_best_kernel().settings))
+        if found.map.left_out_count:
+            again = self._tested(every.with_best_kernel())
+            found = again if again.cost < found.cost - CLEARLY_nats else found
+        self._map = found.map
         for _ in range(_LOOKS):
             seen = self._map.left_out_count
             self._map = FacetedScorer(self._scorer, self._noise).without_errors(self._map.with_best_kernel())
             if self._map.left_out_count == seen:
                 break
+
+    def _tested(self, contact_map: ContactMap) -> Hypothesis:
+        """The map without contacts that do not fit its kernel."""
+        return self._scorer.score(self._scorer.clean(contact_map)[0].with_best_kernel())

@@ -20,6 +20,9 @@ from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 _WHATEVER_THE_POSES = ("contacts_world", "grasp_indices", "_free_world")
 """What a map has computed from its grasps and keeps when only their poses change."""
 
+_WRONG_BY_m = 0.018
+"""Farther than this before a contact that is left out, its finger was on its way, however wrong the contact is."""
+
 WHILE_TRACKING_m = 0.080
 """Longest kernel while more grasps follow: otherwise contacts on a smooth side would rule out the edge behind it."""
 
@@ -74,9 +77,9 @@ class PlacedGrasp:
 
     @property
     def free_world_m(self) -> Array:
-        """Free places, world frame; without those before a contact that is left out, which may be wrong too."""
+        """Free places, world frame; without those near a contact that is left out, which may be wrong too."""
         world = self.contacts_world
-        return world.free_m[~np.isin(world.free_of, sorted(self.left_out))]
+        return world.free_m[~np.isin(world.free_of, sorted(self.left_out)) | (world.free_ahead_m > _WRONG_BY_m)]
 
     def was_left(self, noise: MotionNoise) -> bool:
         """Whether the hand left the object in place before, and it is therefore expected to move less."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -52,6 +53,15 @@ class ContactSet:
     @property
     def dimension(self) -> int:
         return int(self.points_m.shape[1])
+
+    @cached_property
+    def free_ahead_m(self) -> Array:
+        """Distance of each free place from its finger's contact, 0 where there was none, shape (q,)."""
+        ahead_m, touching = np.zeros(len(self.free_m)), np.flatnonzero(self.free_of >= 0)
+        if len(touching):
+            steps_m = self.free_m[touching] - self.points_m[self.free_of[touching]]
+            ahead_m[touching] = np.linalg.norm(steps_m, axis=1)
+        return ahead_m
 
     @property
     def sideways_sigma_m(self) -> Array:

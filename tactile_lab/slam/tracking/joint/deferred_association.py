@@ -38,7 +38,7 @@ _LEAST_CONTACTS = 3
 _LEAST_FITTING = 2
 _DOUBTFUL = 2
 """Number of left-out contacts from which a grasp's place is searched again."""
-_CLEARLY_nats = 12.0
+CLEARLY_nats = 12.0
 """By which contacts that are heard again must make a hypothesis more likely: more than one wrong contact costs."""
 
 
@@ -123,7 +123,7 @@ def hear_again(hypothesis: Hypothesis, scorer: HypothesisScorer) -> list[Hypothe
     if cleaned.left_out_count >= left_out:
         return []
     heard = scorer.smooth(cleaned.with_best_kernel(), _SMOOTHING_STEPS)
-    return [heard] if heard.cost < hypothesis.cost - _CLEARLY_nats else []
+    return [heard] if heard.cost < hypothesis.cost - CLEARLY_nats else []
 
 
 def _is_doubtful(grasp: PlacedGrasp) -> bool:

@@ -11,11 +11,18 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import rotate, transform_points
+from tactile_lab.experiments.data.planar_data import simulate_section
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps, simulate
-from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, known_share, touched_figures
+from tactile_lab.experiments.touched_metrics import (
+    NOTHING_TOUCHED,
+    known_share,
+    touched_figures,
+    touched_outline_figures,
+)
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
+from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
 
 def touched_at_low_x() -> SpatialGrasps:
@@ -84,3 +91,20 @@ def test_known_is_where_the_model_is_near_and_says_so(sigma_m: float, wider_m: f
 
 def test_nothing_is_known_without_a_model() -> None:
     assert known_share(None, box()) == 0.0
+
+
+@pytest.mark.parametrize(("wider_m", "within"), [(0.0, 1.0), (0.004, 0.0)])
+def test_in_the_plane_what_lies_near_a_contact_counts(wider_m: float, within: float) -> None:
+    data = simulate_section("wedge", 3001, height_share=0.25, motion_scale=0.1, count=12)
+    assert np.ptp(data.outline_m, axis=0) == pytest.approx([0.1, 0.06])
+    outline_m = data.outline_m * (1 + wider_m / np.abs(data.outline_m).max(axis=0))
+    grasps, poses = data.grasps, data.world_T_body
+    points = np.vstack([transform_points(p.inverse(), g.points_world_m) for g, p in zip(grasps, poses, strict=True)])
+    normals = np.vstack([rotate(p.inverse(), g.normals_world) for g, p in zip(grasps, poses, strict=True)])
+    dense_m = sample_polygon(outline_m, 0.001)
+    contour = Contour(dense_m, np.full(len(dense_m), 0.001), is_closed=True)
+    field = Gpis.fit(points[:, :2], normals[:, :2])
+    found = touched_outline_figures(data, SlamResult("joint", 0, 2, (), (), (), (), field, contour, None, "complete"))
+    assert found["touched_hausdorff_mm"] == pytest.approx(1e3 * wider_m * np.sqrt(2), abs=0.1)
+    assert found["touched_within_2_sigma"] == pytest.approx(within, abs=0.05)
+    assert found["touched_share"] > 0.9

@@ -7,6 +7,8 @@ import pytest
 import trimesh
 
 from drivers.core.errors import ShapeError
+from drivers.core.poses import rotate, transform_points
+from tactile_lab.experiments.data.spatial_data import simulate
 from tactile_lab.slam.shape.fields.drawn_field import DrawnField
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.standing_field import StandingField
@@ -198,3 +200,17 @@ def test_faces_that_only_follow_their_own_contacts_are_not_taken() -> None:
     assert within[surface.vertices[:, 2] > 0.01].mean() > 0.85
     assert not foretells_better(Polyhedron.fit, field, 0.006, 0.0)
     assert foretells_better(Polyhedron.fit, field_on(box_mesh(), 100, seed=3), 0.006, 0.0)
+
+
+def test_a_solid_of_revolution_that_predicts_contacts_better_stands_before_many_small_faces() -> None:
+    """The faces have 200 nats more: they follow a flat tin's round wall."""
+    data = simulate("tin", 7, heights="all")
+    points, normals = [], []
+    for grasp, pose in zip(data.grasps, data.world_T_body, strict=True):
+        points.append(transform_points(pose.inverse(), grasp.points_world_m))
+        normals.append(rotate(pose.inverse(), grasp.normals_world))
+    field = Gpis.fit(np.vstack(points), np.vstack(normals), POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise()
+    shape = best_shape(field, floor_m=0.0)
+    assert shape.name == "turned"
+    assert Polyhedron.fit(field).log_evidence > shape.log_evidence + 100
+    assert mesh_errors(shape.mesh(floor_m=0.0), data.mesh).hausdorff_m < 0.004

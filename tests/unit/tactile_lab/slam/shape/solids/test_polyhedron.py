@@ -167,3 +167,14 @@ def test_contacts_that_share_no_plane_enclose_nothing() -> None:
     solid = Polyhedron.fit(Gpis.fit(points, normals, 0.0005, 0.01))
     with pytest.raises(ShapeError, match="no plane is touched twice"):
         solid.mesh()
+
+
+def test_a_slope_does_not_end_the_solid_where_it_would_reach_the_table() -> None:
+    """A wedge of 100 mm whose low end nobody touched: its top alone would reach the table 33 mm beyond."""
+    corners = [(x, y, z) for y in (-30, 30) for x, z in ((-50, 0), (50, 0), (50, 15), (-50, 60))]
+    mesh = trimesh.convex.convex_hull(np.array(corners) / 1000)
+    points, normals = contacts_on(mesh, 150, seed=1)
+    touched = normals[:, 0] < 0.9
+    field = Gpis.fit(points[touched], normals[touched], POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise()
+    ends = Polyhedron.fit(field).mesh(floor_m=0.0).vertices[:, 0]
+    assert 0.045 < ends.max() < 0.065

@@ -15,6 +15,7 @@ from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments.data import spatial_data
 from tactile_lab.experiments.data.planar_data import simulate
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
+from tactile_lab.experiments.touched_metrics import touched_figures
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tests.support.simulated_contacts import registration_mm
@@ -44,6 +45,15 @@ def test_known_poses_place_a_solid_too() -> None:
     data = spatial_data.simulate("box-12x6x6", 1, count=6)
     result = run(data, "known-pose", data.world_T_body, dimension=3, mesh_resolution_m=0.006)
     assert registration_mm(data, result) < 1e-6
+
+
+def test_known_poses_keep_the_contacts_inside_a_cup() -> None:
+    """A field that has seen the outside first has no room for a wall of 4 mm, and leaves the inside out."""
+    data = spatial_data.simulate("cup", 7, count=24, motion_scale=0.1, heights="all")
+    result = run(data, "known-pose", data.world_T_body, dimension=3, mesh_resolution_m=0.006)
+    left_out = sum(step.contacts for step in result.steps) - len(result.surface.contacts_m)
+    assert left_out < 10
+    assert touched_figures(data, result)["touched_hausdorff_mm"] < 5
 
 
 def test_a_grasp_whose_pose_is_not_known_is_kept_aside_and_the_next_ones_are_placed() -> None:
