@@ -138,9 +138,9 @@ def judge(
     return replace(quality, judgements=_judgements(quality, limits or QualityLimits()))
 
 
-def judging_steps(problem: Problem) -> int:
-    """Solutions that :func:`judge` needs."""
-    return problem.count + min(FOLDS, problem.count)
+def judging_steps(count: int) -> int:
+    """Solutions that :func:`judge` needs for so many observations."""
+    return count + min(FOLDS, count)
 
 
 def region_holds(solution: Solution, truth: Pose3) -> bool:

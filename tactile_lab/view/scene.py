@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from gtsam import Pose3, Rot3
+from gtsam import Pose3
 
 from drivers.camera.packet import picture_of
 from drivers.core.contacts import Array
 from sessions.perception.interpreter import CAMERA_LINK
 from sessions.recording.traffic import schemas
+from sessions.recording.traffic.foxglove import pose_of
 from tactile_lab.view.course import ShownCourse
 
 PALM = "palm"
@@ -139,7 +140,7 @@ class Scene:
 
 def _hand(scene: Scene, content: dict[str, Any]) -> None:
     for item in content["transforms"]:
-        pose = _pose(item["translation"], item["rotation"])
+        pose = pose_of(item["translation"], item["rotation"])
         if item["child_frame_id"] == PALM:
             scene.world_T_palm = pose
         else:
@@ -166,7 +167,7 @@ def _grasp(scene: Scene, content: dict[str, Any]) -> None:
 
 
 def _slam_pose(scene: Scene, content: dict[str, Any]) -> None:
-    scene.world_T_object = _pose(content["pose"]["position"], content["pose"]["orientation"])
+    scene.world_T_object = pose_of(content["pose"]["position"], content["pose"]["orientation"])
     scene.changed.add("object")
 
 
@@ -236,11 +237,6 @@ _READERS = {
 CAMERA_PACKETS = schemas.received_topic(CAMERA_LINK)
 SHOWN_TOPICS = frozenset({*_READERS, CAMERA_PACKETS})
 """Whether a page needs this topic."""
-
-
-def _pose(position: dict[str, float], rotation: dict[str, float]) -> Pose3:
-    rotated = Rot3.Quaternion(rotation["w"], rotation["x"], rotation["y"], rotation["z"])
-    return Pose3(rotated, np.array([position["x"], position["y"], position["z"]]))
 
 
 def ellipse(covariance: Array, sigmas: float = 2.0, points: int = 48) -> Array:

@@ -19,6 +19,7 @@ from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
 from drivers.shadow.model.kinematics import JOINTS
 from sessions.recording.traffic import schemas
+from sessions.recording.traffic.foxglove import pose_of
 from sessions.rig_runtime.state_recording import BASE_JOINTS
 from tactile_lab.outline_walls import wall
 from tactile_lab.viewers.camera_pose import CameraPose
@@ -122,7 +123,7 @@ class Story:
         yield Touches(stamp_ns, index, tuple(_touch(one) for one in content["contacts"]), gone)
 
     def _slam_pose(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
-        self._estimate = _pose(content["pose"]["position"], content["pose"]["orientation"])
+        self._estimate = pose_of(content["pose"]["position"], content["pose"]["orientation"])
         yield from ()  # told with its covariance, which comes next
 
     def _slam_state(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
@@ -151,7 +152,7 @@ class Story:
         yield Candidates(stamp_ns, found, f"{content['policy']}: {content['reason']}")
 
     def _truth(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
-        self._objects[TRUE_OBJECT] = pose = _pose(content["pose"]["position"], content["pose"]["orientation"])
+        self._objects[TRUE_OBJECT] = pose = pose_of(content["pose"]["position"], content["pose"]["orientation"])
         yield ObjectPose(stamp_ns, pose, true=True)
 
     def _image(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
@@ -223,8 +224,3 @@ def _covariance(planar: Any) -> Array | None:
 def _grasp_frame(content: Plain) -> Pose3:
     place = [float(content[name]) for name in ("x_m", "y_m", "height_m")]
     return Pose3(Rot3.Yaw(float(content["yaw_rad"])), np.array(place))
-
-
-def _pose(position: Plain, rotation: Plain) -> Pose3:
-    turned = Rot3.Quaternion(rotation["w"], rotation["x"], rotation["y"], rotation["z"])
-    return Pose3(turned, np.array([position["x"], position["y"], position["z"]]))

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from gtsam import Pose3
+from gtsam import Pose3, Rot3
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array, Contact
@@ -96,6 +96,12 @@ def vector(values: Array) -> Json:
 def pose(target_T_source: Pose3) -> Json:
     """A Foxglove pose."""
     return {"position": vector(target_T_source.translation()), "orientation": quaternion(target_T_source)}
+
+
+def pose_of(position: Mapping[str, float], orientation: Mapping[str, float]) -> Pose3:
+    """The pose of a Foxglove vector and quaternion."""
+    rotation = Rot3.Quaternion(orientation["w"], orientation["x"], orientation["y"], orientation["z"])
+    return Pose3(rotation, np.array([position["x"], position["y"], position["z"]]))
 
 
 def quaternion(target_T_source: Pose3) -> Json:

@@ -11,7 +11,7 @@ from tactile_lab.experiments.data.planar_data import PlanarGrasps, outline
 from tactile_lab.experiments.data.planar_hand import PlanarHand, slip
 from tactile_lab.experiments.data.sensing import planar_pose
 from tactile_lab.experiments.data.solids import Solid, solid
-from tactile_lab.experiments.data.spatial_data import SessionAtAllHeights, SpatialGrasps, gather
+from tactile_lab.experiments.data.spatial_data import MovedAtAllHeights, SpatialGrasps, gather
 
 CREEP = np.array([3e-4, 3e-4, np.deg2rad(0.3)])
 PUSH = np.array([0.006, 0.006, np.deg2rad(10.0)])
@@ -67,7 +67,7 @@ def simulate_thing(shape: str, seed: int, *, count: int = 12) -> SpatialGrasps:
     return gather(shape, _ThingLeft(solid(shape), np.random.default_rng([seed, 52711])), count)
 
 
-class _ThingLeft(SessionAtAllHeights):
+class _ThingLeft(MovedAtAllHeights):
     """The hand comes from elsewhere each time and carries nothing."""
 
     def __init__(self, body: Solid, rng: np.random.Generator) -> None:

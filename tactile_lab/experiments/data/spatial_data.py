@@ -94,25 +94,25 @@ def simulate(
         ConfigurationError: there is no such solid, or its mesh is not on this machine.
     """
     rng = np.random.default_rng([seed, 31607, round(1000 * motion_scale), ("table", "free").index(motion)])
-    on_table = _OnTable if heights == "three" else SessionAtAllHeights
-    session = (on_table if motion == "table" else _InSpace)(solid(shape), motion_scale, rng)
-    return gather(shape, session, count, outlier_share)
+    on_table = _OnTable if heights == "three" else MovedAtAllHeights
+    moved = (on_table if motion == "table" else _InSpace)(solid(shape), motion_scale, rng)
+    return gather(shape, moved, count, outlier_share)
 
 
-def gather(shape: str, session: Session, count: int, outlier_share: float = 0.0) -> SpatialGrasps:
+def gather(shape: str, moved: MovedSolid, count: int, outlier_share: float = 0.0) -> SpatialGrasps:
     """The grasps of a session, one after the other; the object's frame is born at the first one's contacts."""
     grasps: list[Grasp] = []
     truth: list[Pose3] = []
     hand_motion = Pose3()
     for index in range(count):
         if index:
-            hand_motion = session.reorient(grasps[-1])
-        contacts, lines = session.close(index, outlier_share)
-        grasps.append(Grasp(index, index * 10**9, contacts, session.world_T_palm, hand_motion, lines))
-        truth.append(session.world_T_body)
+            hand_motion = moved.reorient(grasps[-1])
+        contacts, lines = moved.close(index, outlier_share)
+        grasps.append(Grasp(index, index * 10**9, contacts, moved.world_T_palm, hand_motion, lines))
+        truth.append(moved.world_T_body)
         if index == 0 and contacts:
-            session.bear_frame(grasps[0].points_world_m.mean(axis=0))
-    return SpatialGrasps(shape, tuple(grasps), tuple(truth), session.solid.mesh)
+            moved.bear_frame(grasps[0].points_world_m.mean(axis=0))
+    return SpatialGrasps(shape, tuple(grasps), tuple(truth), moved.solid.mesh)
 
 
 def random_contacts(shape: str, count: int, seed: int, *, foot: bool = False) -> SpatialGrasps:
@@ -141,7 +141,7 @@ def random_contacts(shape: str, count: int, seed: int, *, foot: bool = False) ->
     return SpatialGrasps(shape, grasps, (pose,) * len(grasps), body.mesh)
 
 
-class Session:
+class MovedSolid:
     """One solid, its true pose and that of the palm; subclasses draw the different kinds of motion."""
 
     floor_m: float = -np.inf
@@ -224,7 +224,7 @@ class Session:
         return np.asarray(start + length * way)
 
 
-class _OnTable(Session):
+class _OnTable(MovedSolid):
     """Poses (x, y, yaw) on the table."""
 
     floor_m = _TABLE_CLEARANCE_m
@@ -267,7 +267,7 @@ class _OnTable(Session):
         self.world_T_palm = spatial(planar_pose(place, self._rng.normal(0.0, 0.1)), _REACH_m)
 
 
-class SessionAtAllHeights(_OnTable):
+class MovedAtAllHeights(_OnTable):
     """The same, with grasps over the whole height."""
 
     def levels_m(self, index: int) -> Array:
@@ -278,7 +278,7 @@ class SessionAtAllHeights(_OnTable):
         return np.asarray(middle + self._rng.uniform(-breadth, breadth, 5))
 
 
-class _InSpace(Session):
+class _InSpace(MovedSolid):
     """Poses with all six degrees of freedom."""
 
     def __init__(self, body: Solid, scale: float, rng: np.random.Generator) -> None:
