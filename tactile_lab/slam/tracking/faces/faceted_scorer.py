@@ -10,13 +10,15 @@ from collections.abc import Callable
 
 import numpy as np
 
+from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.planar.polygon import Polygon
 from tactile_lab.slam.shape.selection.planar_choice import best_shape, free_evidence, polygon_of
 from tactile_lab.slam.shape.selection.spatial_choice import stray_cost
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
-from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh, extract_contour
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
@@ -45,6 +47,8 @@ _HOPELESS_nats = 100.0
 """Flat faces that are less likely than the field by more than this are rejected, whichever contacts are left out."""
 
 _SAME_nats = 1e-6
+_ASTRAY_SIGMAS = 5.0
+"""From the outline: a contact whose face holds it may be so far beyond that face's end."""
 _SETTLING_STEPS = 15
 _FIELD_STEPS = 10
 
@@ -122,6 +126,15 @@ class FacetedScorer:
         sharp = self._sharp(best.map)
         return sharp is not None and sharp.cost <= best.cost + _SAME_nats
 
+    def strayed(self, contact_map: ContactMap) -> frozenset[int]:
+        """Grasps in the plane that have a contact on the line of a face but far beyond its ends."""
+        fitted = contact_map.fit()
+        try:
+            away_m, weights = _away_from_m(_polygon(fitted), fitted)
+        except ShapeError:  # nothing enclosed, or no faces in it
+            return frozenset()
+        return frozenset(contact_map.grasp_indices[away_m * np.sqrt(weights) > _ASTRAY_SIGMAS].tolist())
+
     def smooth(self, contact_map: ContactMap) -> Hypothesis:
         """As :meth:`better`, after the poses were smoothed with the field, and contacts left out that do not fit it."""
         return self.better(self._scorer.smooth(contact_map, _FIELD_STEPS).map)
@@ -190,9 +203,20 @@ def _explain(contact_map: ContactMap, fitted: Gpis) -> tuple[float, float]:
     """Log evidence of the best sharp shape, and the cost of the free places it fills. Raises ShapeError."""
     free = contact_map.free_points_m
     if contact_map.dimension == 2:
-        polygon = polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
-        return polygon.log_evidence, -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
+        polygon = _polygon(fitted)
+        strays = stray_cost(*_away_from_m(polygon, fitted))
+        return polygon.log_evidence - strays, -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
     return _best_solid(contact_map, fitted)[0], _intrusion(contact_map)
+
+
+def _polygon(fitted: Gpis) -> Polygon:
+    """The outline with flat faces. Raises ShapeError if there is none."""
+    return polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+
+
+def _away_from_m(polygon: Polygon, fitted: Gpis) -> tuple[Array, Array]:
+    """Distances of all contacts from an outline, and the inverse variances of their noise, each of shape (n,)."""
+    return distances_to_polygon(fitted.contacts_m, polygon.outline_m), fitted.observations.value_sigma_m**-2.0
 
 
 def _intrusion(contact_map: ContactMap) -> float:

@@ -8,8 +8,9 @@ from many samples of the motion model, and the most promising other places are t
 A wrong turn of a trajectory persists: the following grasps fit each other, and none of them can go back alone. So in
 space the grasps after it are also driven onto the object from its other place, and tried with it.
 
-In space grasps are driven onto the solid that the faces make. In the plane only grasps that the outline explains badly
-or that have few contacts are tested again, and they are driven onto the field of all others.
+In space grasps are driven onto the solid that the faces make. In the plane only grasps that the outline explains badly,
+that slid off the end of a face, or that have few contacts are tested again, and they are driven onto the field of all
+others.
 """
 
 from __future__ import annotations
@@ -128,7 +129,9 @@ class Relocalizer:
         if known.dimension == 3:
             onto, settings = _onto_solid(best, self._sharp), settings.model_copy(update={"samples": _SAMPLES})
         else:
-            onto = _onto_others(known, [i for i, grasp in enumerate(known.placed) if i and _fits_poorly(grasp)])
+            strayed = self._sharp.strayed(known)
+            poor = [i for i, grasp in enumerate(known.placed) if i and (i in strayed or _fits_poorly(grasp))]
+            onto = _onto_others(known, poor)
         search = _search(known)
         return _promising(_Outlook(known, onto, self._noise, settings), search.hopeless_nats)[: search.tried]
 

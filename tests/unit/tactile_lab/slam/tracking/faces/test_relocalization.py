@@ -187,3 +187,15 @@ def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outli
 def test_grasps_that_fit_an_outline_stay(outline: ContactMap) -> None:
     right = judge_of(outline).better(outline)
     assert Relocalizer(judge_of(outline), NOISE, ProposalSettings()).improve(right) is right
+
+
+def test_a_grasp_that_slid_off_the_end_of_a_face_is_found_its_place(outline: ContactMap) -> None:
+    """All contacts of grasp 2 are on two parallel faces, along which nothing but its slips holds it."""
+    judge, rows = judge_of(outline), outline.rows
+    rows[2] = outline.space.compose(rows[2], np.array([-0.03, 0.0, 0.0]))
+    slid = HypothesisScorer(NOISE, 2.0).score(outline.with_rows(rows))
+    assert judge.strayed(outline) == frozenset()
+    assert judge.strayed(slid.map) == {2}
+    found = Relocalizer(judge, NOISE, ProposalSettings()).improve(slid)
+    assert found.cost < slid.cost - 10
+    assert judge.strayed(found.map) == frozenset()
