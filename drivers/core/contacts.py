@@ -41,6 +41,8 @@ class Contact:
             until the grasp.
         shared_covariance_m2: the part of ``point_covariance_m2`` by errors that all touches of this finger share during
             a session (offsets of its joint sensors), shape (3, 3): more touches do not reduce it; None for none.
+        shared_by_all: whether these errors are the same for all fingers (their skins, one calibration), and not each
+            finger's own: then they make the whole object larger or smaller.
         shared_moves_m: instead of it, where it is known: how one standard deviation of each of these errors moves the
             point, shape (3, k), world frame. A column means the same error in all touches of a finger, with another
             displacement in another posture, so that the errors can be estimated.
@@ -55,6 +57,7 @@ class Contact:
     probed: bool = False
     shared_covariance_m2: Array | None = None
     shared_moves_m: Array | None = None
+    shared_by_all: bool = False
 
 
 @dataclass(frozen=True)

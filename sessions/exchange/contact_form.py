@@ -120,6 +120,7 @@ class ContactEntry(StrictModel):
     point_covariance_m2: CovarianceRows | None = None
     shared_covariance_m2: CovarianceRows | None = None
     shared_moves_m: tuple[_Moves, _Moves, _Moves] | None = None
+    shared_by_all: bool = False
     normal_sigma_rad: _Angle | None = Field(default=None, gt=0.0)
     force_N: float | None = Field(default=None, ge=0.0)
 

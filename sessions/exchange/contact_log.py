@@ -179,6 +179,7 @@ def _contact(entry: ContactEntry, document: Document) -> Contact:
         force_N=entry.force_N or 0.0,
         shared_covariance_m2=None if entry.shared_covariance_m2 is None else np.array(entry.shared_covariance_m2),
         shared_moves_m=None if entry.shared_moves_m is None else np.array(entry.shared_moves_m),
+        shared_by_all=entry.shared_by_all,
     )
 
 
@@ -239,6 +240,8 @@ def _contact_entry(contact: Contact, log: ContactLog, scale: Array) -> dict[str,
         entry["shared_covariance_m2"] = (contact.shared_covariance_m2 * np.outer(scale, scale)).tolist()
     if contact.shared_moves_m is not None:
         entry["shared_moves_m"] = (scale[:, None] * contact.shared_moves_m).tolist()
+    if contact.shared_by_all:
+        entry["shared_by_all"] = True
     if normal_sigma_rad != log.normal_sigma_rad:
         entry["normal_sigma_rad"] = normal_sigma_rad
     if contact.force_N:

@@ -32,7 +32,7 @@ _BIAS_m = 0.0002
 """How much deeper all contacts of a session lie than the surface."""
 
 _BIAS_COVARIANCE_m2 = _BIAS_m**2 * np.eye(3)
-"""What contacts state of it: what all touches of a finger share, as after a calibration that is good to so much."""
+"""What contacts state of it: what all touches of all fingers share, as after a calibration that is good to so much."""
 
 _CONTACT_FREEDOM, _SLIP_FREEDOM = 4.0, 6.0
 """Degrees of freedom of Student's t distribution, scaled to the stated standard deviation."""
@@ -225,7 +225,7 @@ class _Hand:
             point, normal = point + self._noisy * rng.normal(0.0, _WRONG_m, 3), self._noisy * rng.normal(size=3)
         covariance_m2 = OWN_SIGMA_m**2 * np.eye(3) + _BIAS_COVARIANCE_m2
         given = finger, point, _unit(normal), covariance_m2, NORMAL_SIGMA_rad, _FORCE_N
-        return Contact(*given, shared_covariance_m2=_BIAS_COVARIANCE_m2)
+        return Contact(*given, shared_covariance_m2=_BIAS_COVARIANCE_m2, shared_by_all=True)
 
     def _heavy(self, freedom: float, count: int) -> Array:
         """Numbers of Student's t distribution, of variance 1."""

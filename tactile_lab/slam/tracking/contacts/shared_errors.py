@@ -1,9 +1,9 @@
 """Errors that all contacts of one finger share during a session: more grasps do not reduce them.
 
 The offsets of a finger's joint sensors move all its contacts. Where a contact states only how much, they are taken as
-one number for each finger, how far it feels surfaces too far out or in, independent of the other fingers'. Where it
-states how far each offset moves it, which depends on the finger's posture, they are estimated at the end of a session
-(:mod:`resolved_errors`).
+one number for each finger, how far it feels surfaces too far out or in, independent of the other fingers', or as one
+for all of them if it says so. Where it states how far each offset moves it, which depends on the finger's posture, they
+are estimated at the end of a session (:mod:`resolved_errors`).
 """
 
 from __future__ import annotations
@@ -17,13 +17,16 @@ from numpy.typing import NDArray
 
 from drivers.core.contacts import Array, Contact
 
+ALL_FINGERS = "all"
+"""In place of a finger's name: of an error that is the same for all fingers."""
+
 
 @dataclass(frozen=True)
 class SharedErrors:
     """Of some contacts; empty if unknown.
 
     Attributes:
-        fingers: name of the finger of each contact, shape (n,).
+        fingers: name of the finger of each contact, shape (n,), or :data:`ALL_FINGERS` where its error is theirs.
         sigma_m: standard deviation of what each contact shares with the others of its finger, along its normal,
             shape (n,); 0 where it was estimated and taken away.
         moves_m: how one standard deviation of each error of its finger moves each contact along its normal, shape
@@ -39,7 +42,7 @@ class SharedErrors:
         """Of contacts with outward normals of shape (n, 3)."""
         given = np.array([_covariance_m2(one) for one in contacts]).reshape(-1, 3, 3)
         variances = np.einsum("ni,nij,nj->n", normals, given, normals)
-        fingers = np.array([one.finger for one in contacts], dtype=np.str_)
+        fingers = np.array([ALL_FINGERS if one.shared_by_all else one.finger for one in contacts], dtype=np.str_)
         return cls(fingers, np.sqrt(np.maximum(variances, 0.0)), _along(contacts, normals))
 
     @classmethod

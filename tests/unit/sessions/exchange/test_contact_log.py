@@ -98,7 +98,7 @@ def test_what_is_written_is_read_back(tmp_path):
 def test_what_the_contacts_of_a_finger_share_is_read_back(tmp_path):
     shared = np.diag([4e-7, 1e-7, 2e-7])
     touches = (
-        replace(contact("FF", [0.01, 0.02, 0.03], [1, 0, 0]), shared_covariance_m2=shared),
+        replace(contact("FF", [0.01, 0.02, 0.03], [1, 0, 0]), shared_covariance_m2=shared, shared_by_all=True),
         contact("TH", [0.0, 0.02, 0.03], [-1, 0, 0]),
     )
     for dimension, expected in ((3, shared), (2, np.diag([4e-7, 1e-7, 0.0]))):
@@ -106,6 +106,7 @@ def test_what_the_contacts_of_a_finger_share_is_read_back(tmp_path):
         first, second = read_contact_log(tmp_path / f"{dimension}.json").grasps[0].contacts
         np.testing.assert_array_equal(first.shared_covariance_m2, expected)
         assert second.shared_covariance_m2 is None
+        assert (first.shared_by_all, second.shared_by_all) == (True, False)
 
 
 def test_how_each_error_of_a_finger_moves_a_contact_is_read_back(tmp_path):

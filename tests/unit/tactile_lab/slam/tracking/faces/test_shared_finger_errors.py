@@ -12,7 +12,7 @@ from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
-from tactile_lab.slam.tracking.contacts.shared_errors import SharedErrors
+from tactile_lab.slam.tracking.contacts.shared_errors import ALL_FINGERS, SharedErrors
 from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
 from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
@@ -89,6 +89,18 @@ def test_what_fingers_share_is_counted_once(known: ContactMap) -> None:
     assert 0.2 * np.median(without.sigma_m**2) < np.median(own) < 0.9 * np.median(without.sigma_m**2)
 
 
+def test_an_error_that_all_fingers_have_makes_the_outline_larger_or_smaller_by_all_of_it(known: ContactMap) -> None:
+    shape = best_shape(known.fit())
+    placed = []
+    for grasp in known.placed:
+        shared = replace(grasp.contacts_world.shared, fingers=np.full(len(grasp.contacts_world), ALL_FINGERS))
+        placed.append(replace(grasp, contacts_world=replace(grasp.contacts_world, shared=shared)))
+    theirs = propagate_pose_uncertainty(shape.contour(), shape, replace(known, placed=tuple(placed)), NOISE)
+    each = propagate_pose_uncertainty(shape.contour(), shape, known, NOISE)
+    assert theirs.shared_sigma_m == pytest.approx(SHARED_m, rel=0.05)
+    assert each.shared_sigma_m < 0.8 * theirs.shared_sigma_m
+
+
 def test_an_error_that_each_contact_has_by_itself_is_that_of_its_variance(known: ContactMap) -> None:
     """Every contact by a finger of its own: the shared error is drawn anew at each, and sigma is as without it."""
     shape = best_shape(known.fit())
@@ -117,6 +129,7 @@ def test_contacts_keep_their_fingers_where_they_are_selected_moved_and_gathered(
     given = [Contact(finger, np.zeros(3), np.eye(3)[0], shared_covariance_m2=covariance) for finger in ("FF", "TH")]
     shared = SharedErrors.of(given, np.eye(3)[[0, 1]])
     np.testing.assert_allclose(shared.sigma_m, [2e-4, 0.0])
+    assert SharedErrors.of([replace(given[0], shared_by_all=True)], np.eye(3)[:1]).fingers.tolist() == [ALL_FINGERS]
     one = ContactSet(np.zeros((2, 2)), np.eye(2), np.ones(2), np.ones(2), shared=shared)
     unknown = ContactSet(np.zeros((1, 2)), np.eye(2)[:1], np.ones(1), np.ones(1))
     both = ContactSet.concatenate([unknown, one.select(np.array([1, 0])).in_object_frame(np.zeros(3))])
