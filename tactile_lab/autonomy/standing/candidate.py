@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_plan import GraspPlan
+from tactile_lab.autonomy.standing.felt_object import FeltObject
 
 
 @dataclass(frozen=True)
@@ -62,3 +63,22 @@ class StandingCandidate:
     def touches_m(self) -> Array:
         """All expected places, shape (n, 3)."""
         return np.array(list(self.touches.values()))
+
+
+@dataclass
+class ActionPlanner:
+    """What every planner of one kind of action around one object knows.
+
+    Attributes:
+        felt: what is known of the object; who uses the planner keeps it up to date.
+        hand: its form, and the shape of its fingertips.
+        yaw_window_rad: of the arm.
+        reach: of the palm.
+        blocked: actions on whose way the hand met something.
+    """
+
+    felt: FeltObject
+    hand: HandShape
+    yaw_window_rad: tuple[float, float]
+    reach: SideReach
+    blocked: list[StandingCandidate] = field(default_factory=list, kw_only=True)

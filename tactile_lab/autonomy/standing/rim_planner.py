@@ -7,16 +7,14 @@ is hollow is not known before: on a solid one the thumb lands on the top, and af
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from drivers.shadow.closing.closing import LOWEST_m, closing
-from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
-from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate
 
 _CLOSING = "pinch"
 _BELOW_RIM_m, _HIGHEST_m = 0.018, 0.08
@@ -30,22 +28,8 @@ _TRIES = 2
 
 
 @dataclass
-class RimPlanner:
-    """Plans pinches over the rim of one object.
-
-    Attributes:
-        felt: what is known of the object; who uses the planner keeps it up to date.
-        hand: its form, and the shape of its fingertips.
-        yaw_window_rad: of the arm.
-        reach: of the palm.
-    """
-
-    felt: FeltObject
-    hand: HandShape
-    yaw_window_rad: tuple[float, float]
-    reach: SideReach
-    blocked: list[StandingCandidate] = field(default_factory=list)
-    """Pinches on whose way the hand met something."""
+class RimPlanner(ActionPlanner):
+    """Plans pinches over the rim of one object."""
 
     _is_wide: bool = False
     """It was felt once that the hand does not open as wide."""

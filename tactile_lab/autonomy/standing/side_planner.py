@@ -10,17 +10,15 @@ scanned objects put on at least three fingertips (decision 45).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, LOWEST_m, closing, sideways
-from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
-from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear
 
 _MARGIN_m = 0.003
@@ -49,22 +47,8 @@ def slides(height_m: float, half_m: float) -> bool:
 
 
 @dataclass
-class SidePlanner:
-    """Plans grasps from the side around one object.
-
-    Attributes:
-        felt: what is known of the object; who uses the planner keeps it up to date.
-        hand: its form, and the shape of its fingertips.
-        yaw_window_rad: of the arm.
-        reach: of the palm.
-    """
-
-    felt: FeltObject
-    hand: HandShape
-    yaw_window_rad: tuple[float, float]
-    reach: SideReach
-    blocked: list[StandingCandidate] = field(default_factory=list)
-    """Grasps on whose way the hand met something."""
+class SidePlanner(ActionPlanner):
+    """Plans grasps from the side around one object."""
 
     def best(self) -> StandingCandidate | None:
         """The next grasp; None where nothing is left that would tell anything new."""

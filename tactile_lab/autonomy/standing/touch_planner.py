@@ -14,14 +14,12 @@ import numpy as np
 
 from drivers.core.contacts import FINGERS, Array
 from drivers.shadow.closing.closing import SIDES, closing, sideways
-from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.side_survey import LOW_m
 from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m
-from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
-from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
 from tactile_lab.autonomy.standing.side_planner import slides
 
@@ -40,24 +38,14 @@ _FINGERS_APART_m = 0.023
 
 
 @dataclass
-class TouchPlanner:
+class TouchPlanner(ActionPlanner):
     """Plans touches of one object.
 
     Attributes:
-        felt: what is known of the object; who uses the planner keeps it up to date.
-        hand: its form, and the shape of its fingertips.
-        yaw_window_rad: of the arm.
-        reach: of the palm.
         settings: of touches.
     """
 
-    felt: FeltObject
-    hand: HandShape
-    yaw_window_rad: tuple[float, float]
-    reach: SideReach
     settings: TouchSettings = field(default_factory=TouchSettings)
-    blocked: list[StandingCandidate] = field(default_factory=list)
-    """Touches on whose way the hand met something."""
 
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
