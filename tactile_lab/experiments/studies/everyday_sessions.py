@@ -30,12 +30,14 @@ from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.perception.interpreter import HAND_LINK
 from sessions.recording.recorder import NullRecorder
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
+from tactile_lab.autonomy.heuristic_planner import PlanSettings
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.household import HOUSEHOLD
 from tactile_lab.experiments.data.silhouettes import places, silhouettes
 from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.data.true_surface import true_outline
+from tactile_lab.experiments.reachable import ANY_YAW_rad
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
 from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, known_share, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world
@@ -176,7 +178,7 @@ def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, 
     registration = registration_rms_mm(points, poses, truth, dimension) if done else None
     figures = {**shape, "registration_mm": registration, **NOTHING_TOUCHED}
     if dimension == 3:
-        figures["known_share"] = known_share(result.mesh, mesh)
+        figures["known_share"] = known_share(result.mesh, mesh, _yaws_rad(truth))
     if dimension == 3 and any(grasp.contacts for grasp in done):
         return {**figures, **touched_figures(seen, result), **_picture(result, seen)}
     return figures
@@ -197,6 +199,13 @@ def _as_it_lies(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) 
     mesh = trimesh.Trimesh(transform_points(lying, watch.mesh.vertices), watch.mesh.faces, process=False)
     truth = [pose * lying.inverse() for pose in watch.truth[begun:count]]
     return _Seen(mesh, truth, grasps[begun:count], result.world_T_object[begun:count])
+
+
+def _yaws_rad(world_T_body: Sequence[Pose3]) -> list[tuple[float, float]]:
+    """Of the hand, seen from the object in each of its poses; any if there is none."""
+    low, high = PlanSettings().yaw_window_rad
+    headings_rad = [planar(pose).theta() for pose in world_T_body]
+    return [(low - heading, high - heading) for heading in headings_rad] or [ANY_YAW_rad]
 
 
 def _picture(result: SlamResult, seen: _Seen) -> dict[str, Any]:
