@@ -1,4 +1,4 @@
-"""Carries a captured object: weighs it, foretells what will become of it, re-orients it, and tells how it slipped."""
+"""Carries a captured object: weighs it, predicts what will become of it, re-orients it, and tells how it slipped."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Carrier:
     def _reorient(self, grasp: Grasp, wanted: Reorientation) -> Pose3:
         """The object's motion since the capture."""
         cycle = self._roles.performer
-        self._foretell(grasp, wanted)
+        self._forecast(grasp, wanted)
         self._phase("squeeze")
         cycle.squeeze(grasp.touching)
         self._phase("re-orient")
@@ -61,11 +61,11 @@ class Carrier:
             self._tell(Level.INFO, f"the object slips ({cycle.slipped.in_words()}): re-orientation stopped early")
         return self._told_carry() or palm_motion
 
-    def _foretell(self, grasp: Grasp, wanted: Reorientation) -> None:
+    def _forecast(self, grasp: Grasp, wanted: Reorientation) -> None:
         """Hold the object as hard as it needs, and say what is to be expected."""
-        if self._roles.foretell is None:
+        if self._roles.forecast is None:
             return
-        forecast = self._roles.foretell(grasp, wanted.turn_rad, wanted.shift_world_m)
+        forecast = self._roles.forecast(grasp, wanted.turn_rad, wanted.shift_world_m)
         if forecast is None:
             return
         self._runtime.log(Level.INFO, "odometry", f"each finger holds the object with {forecast.force_N:.2f} N")

@@ -164,7 +164,7 @@ class SessionRoles:
         decisions: decides about them.
         estimator: client of estimator and planner; open while the session runs.
         weigh: drags and lifts the object that these fingers hold; None for a session that cannot.
-        foretell: foretells a carry by a turn (radians, about the vertical) and a shift (metres, world), and fits the
+        forecast: predicts a carry by a turn (radians, about the vertical) and a shift (metres, world), and fits the
             force of the fingers to it; None for a session that cannot.
         survey: measures the object's bounding box before the first grasp; its argument returns whether to skip the
             rest. None for a session without it.
@@ -178,7 +178,7 @@ class SessionRoles:
     decisions: DecisionMaker
     estimator: EstimatorClient
     weigh: Callable[[frozenset[str]], LiftEnd] | None = None
-    foretell: Callable[[Grasp, float, Array], Forecast | None] | None = None
+    forecast: Callable[[Grasp, float, Array], Forecast | None] | None = None
     survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
     find: Callable[[Callable[[], bool], Array, float | None], BoundingBox] | None = None
     guard: InterruptGuard = field(default_factory=InterruptGuard)

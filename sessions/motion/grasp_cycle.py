@@ -60,7 +60,7 @@ class GraspCycle:
         """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
 
         self.holding_N = settings.squeeze_force_N
-        """Force of each finger while the object is carried; :meth:`foretell` fits it to what is known of the object."""
+        """Force of each finger while the object is carried; :meth:`forecast` fits it to what is known of the object."""
 
         self.jammed: tuple[str, ...] = ()
         """The fingertips that were pressed so hard in the last re-orientation that it stopped early."""
@@ -219,7 +219,7 @@ class GraspCycle:
 
     # --- carry -------------------------------------------------------------------------------------------------
 
-    def foretell(self, grasp: Grasp, turn_rad: float, shift_world_m: Array) -> Forecast | None:
+    def forecast(self, grasp: Grasp, turn_rad: float, shift_world_m: Array) -> Forecast | None:
         """What will become of the object in this carry, which is then held as hard as it needs; None if its friction on
         the table was not measured: then it is held with the usual force.
         """

@@ -52,10 +52,10 @@ class HoldingForces:
         slippery = replace(friction, table_N=measured.most_table_N or friction.table_N)
         allowed = self._allowed_N()
         for force_N in allowed:
-            worst = intended.foretell(force_N, self.balanced_N(force_N), slippery, measured.weight_N)
+            worst = intended.forecast(force_N, self.balanced_N(force_N), slippery, measured.weight_N)
             if worst.slip_m <= self.settings.slip_m and worst.slip_rad <= self.settings.slip_rad:
                 break
-        return intended.foretell(force_N, self.balanced_N(force_N), friction, measured.weight_N)
+        return intended.forecast(force_N, self.balanced_N(force_N), friction, measured.weight_N)
 
     def _allowed_N(self) -> tuple[float, ...]:
         most_N = self.settings.pressed_share * self.pressed_N

@@ -59,10 +59,10 @@ def autonomous_roles(
     guard = InterruptGuard()
     decisions = PolicyDecisions(client, record_choices(runtime), approve, guard)
     if not settings.probing.is_wanted:
-        return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.foretell, guard=guard)
+        return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.forecast, guard=guard)
     prober = BoxProber(Toucher(motion, settings.cycle, hand), settings.probing, window, settings.plan.start_m)
     felt = prober.feel, prober.find_again
-    return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.foretell, *felt, guard)
+    return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.forecast, *felt, guard)
 
 
 def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, seed: int, dimension: int) -> Planner:

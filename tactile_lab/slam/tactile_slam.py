@@ -1,6 +1,6 @@
 """Tactile SLAM: follow an object through successive grasps and build its shape at the same time.
 
-:meth:`TactileSlam.step` is algorithm 3.1 of the thesis for one grasp, followed by the pose graph of its
+:meth:`TactileSlam.add_grasp` is algorithm 3.1 of the thesis for one grasp, followed by the pose graph of its
 section 3.3.3. Frames: the object frame is defined by the first grasp, its origin at the contacts' centre, its x
 axis along the palm's horizontal axis, z up (section 3.4). The object stays on the table: its pose is
 ``(x, y, yaw)`` and its origin keeps its initial height, so that in the object frame a contact's z is its

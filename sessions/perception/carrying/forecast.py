@@ -1,6 +1,6 @@
 """What will become of an object that is about to be carried: whether it slips, and whether only the fingers keep it up.
 
-The same balance of friction that follows a carry foretells one: of fingertips that stay where they are in the hand,
+The same balance of friction that follows a carry predicts one: of fingertips that stay where they are in the hand,
 press with the forces that are intended, and yield where the object presses back, as force control lets them. It tells
 what the fingers cannot hold, not the few millimetres by which fingers that are moved always drag the object.
 """
@@ -81,7 +81,7 @@ class IntendedCarry:
         poses = [Pose2(float(x), float(y), float(yaw)) for (x, y), yaw in zip(places_m, turns_rad, strict=True)]
         return cls(contacts, poses, duration_s, yielding_m_s_N)
 
-    def foretell(self, force_N: float, forces_N: Mapping[str, float], friction: Friction, weight_N: float) -> Forecast:
+    def forecast(self, force_N: float, forces_N: Mapping[str, float], friction: Friction, weight_N: float) -> Forecast:
         """What will become of the object.
 
         Args:

@@ -1,4 +1,4 @@
-"""Whether the grasps before and after some step can be of one object: then their contacts foretell each other.
+"""Whether the grasps before and after some step can be of one object: then their contacts predict each other.
 
 The poses of another object's grasps are free, so that they can often be placed on the first one or beside it: what fits
 is kept, the rest is left out as wrong contacts, and every slip is small. But the two parts tell nothing about each

@@ -33,7 +33,7 @@ Fit: TypeAlias = Callable[[Gpis], FittedShape]
 """Makes a solid from the field of some of the contacts."""
 
 
-def foretells_better(fit: Fit, gpis: Gpis, resolution_m: float, floor_m: float | None) -> bool:
+def predicts_better(fit: Fit, gpis: Gpis, resolution_m: float, floor_m: float | None) -> bool:
     """Whether a sharp solid predicts the contacts of a field better than the field does.
 
     Args:
@@ -44,17 +44,17 @@ def foretells_better(fit: Fit, gpis: Gpis, resolution_m: float, floor_m: float |
     """
 
     def advantage(held: Indices, rest: Indices) -> float:
-        return _foretold(fit, gpis, held, rest, resolution_m, floor_m) - gpis.log_density_given_others(held)
+        return _predicted(fit, gpis, held, rest, resolution_m, floor_m) - gpis.log_density_given_others(held)
 
     return _sum_over_parts(advantage, len(gpis.contacts_m)) > 0
 
 
-def foretells_better_than(fit: Fit, other: Fit, gpis: Gpis, resolution_m: float, floor_m: float | None) -> bool:
-    """Whether a solid predicts contacts better than another solid; arguments as of :func:`foretells_better`."""
+def predicts_better_than(fit: Fit, other: Fit, gpis: Gpis, resolution_m: float, floor_m: float | None) -> bool:
+    """Whether a solid predicts contacts better than another solid; arguments as of :func:`predicts_better`."""
 
     def advantage(held: Indices, rest: Indices) -> float:
         given = gpis, held, rest, resolution_m, floor_m
-        return max(_foretold(fit, *given), _NOTHING_nats) - max(_foretold(other, *given), _NOTHING_nats)
+        return max(_predicted(fit, *given), _NOTHING_nats) - max(_predicted(other, *given), _NOTHING_nats)
 
     return _sum_over_parts(advantage, len(gpis.contacts_m)) > 0
 
@@ -70,7 +70,7 @@ def _sum_over_parts(advantage: Callable[[Indices, Indices], float], count: int) 
     return total
 
 
-def _foretold(fit: Fit, gpis: Gpis, held: Indices, rest: Indices, resolution_m: float, floor_m: float | None) -> float:
+def _predicted(fit: Fit, gpis: Gpis, held: Indices, rest: Indices, resolution_m: float, floor_m: float | None) -> float:
     """Log density of held-out contacts on the solid of the rest; minus infinity if that does not enclose anything."""
     try:
         mesh = fit(gpis.of_some(rest)).mesh(resolution_m, floor_m)

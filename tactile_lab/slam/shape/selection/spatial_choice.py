@@ -16,7 +16,7 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.model import FittedShape
-from tactile_lab.slam.shape.selection.held_out import foretells_better, foretells_better_than
+from tactile_lab.slam.shape.selection.held_out import predicts_better, predicts_better_than
 from tactile_lab.slam.shape.selection.unexplained import are_inside, unexplained
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
@@ -115,7 +115,7 @@ def _rounder(
         fit = Turned.fit if isinstance(round_, Turned) else turned_with_parts
         return fit(some, floor_m, free_points_m)
 
-    return best if foretells_better_than(sharp, turn, gpis, _COARSE_m, floor_m) else round_
+    return best if predicts_better_than(sharp, turn, gpis, _COARSE_m, floor_m) else round_
 
 
 def _revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:
@@ -206,7 +206,7 @@ def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> boo
     """Whether a sharp solid with more evidence than the field also passes the cross-validation."""
     if not gpis.settings.without.isdisjoint({"field", "held-out contacts"}):
         return True
-    return _beyond_doubt(evidence, gpis) or foretells_better(fit, gpis, _COARSE_m, floor_m)
+    return _beyond_doubt(evidence, gpis) or predicts_better(fit, gpis, _COARSE_m, floor_m)
 
 
 def _without_strays(gpis: Gpis) -> tuple[Gpis, float]:

@@ -109,7 +109,7 @@ def associate_deferred(
     return hypothesis
 
 
-def hear_again(hypothesis: Hypothesis, scorer: HypothesisScorer) -> list[Hypothesis]:
+def readmit_contacts(hypothesis: Hypothesis, scorer: HypothesisScorer) -> list[Hypothesis]:
     """The hypothesis with all contacts that were left out heard again, if that is clearly more likely; smoothed.
 
     Args:

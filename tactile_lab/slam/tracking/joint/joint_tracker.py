@@ -219,7 +219,7 @@ class JointTracker:
             self._hypotheses = self._likeliest(self._scorer.different(smoothed), self._settings.hypotheses)
             self._share_best_kernel()
         placed = [opinions.place_deferred(one) for one in self._hypotheses]
-        faceted = opinions.with_faces(placed, opinions.hear_again(min(placed, key=cost)))
+        faceted = opinions.with_faces(placed, opinions.readmit_contacts(min(placed, key=cost)))
         self._rivals = opinions.rivals
         faceted[0] = self._resolve_errors(faceted[0])
         found = PoseCovariances.of(faceted[0].map, self._noise)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
-from tactile_lab.slam.tracking.joint.deferred_association import Relocate, associate_deferred, hear_again
+from tactile_lab.slam.tracking.joint.deferred_association import Relocate, associate_deferred, readmit_contacts
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
 from tactile_lab.slam.tracking.joint.settings import JointSettings
@@ -65,9 +65,9 @@ class SecondOpinions:
         promising = sorted(others, key=cost)[: self._settings.smoothed]
         return [self._scorer.smooth(other.map, self._settings.iterations) for other in promising]
 
-    def hear_again(self, best: Hypothesis) -> list[Hypothesis]:
+    def readmit_contacts(self, best: Hypothesis) -> list[Hypothesis]:
         """The hypothesis with the contacts that it leaves out; none if it leaves out hardly any, or rightly."""
-        return self._mechanisms.add("deferred association", lambda: hear_again(best, self._scorer))
+        return self._mechanisms.add("deferred association", lambda: readmit_contacts(best, self._scorer))
 
     def with_faces(self, hypotheses: list[Hypothesis], further: list[Hypothesis]) -> list[Hypothesis]:
         """The hypotheses scored by flat faces, most likely first.

@@ -52,7 +52,7 @@ class Bench:
             performer=cycle,
             decisions=decisions,
             weigh=(lambda touching: self.done.append("weigh") or end) if can_weigh else None,
-            foretell=lambda grasp, turn, shift: self.done.append("foretell") or forecast,
+            forecast=lambda grasp, turn, shift: self.done.append("forecast") or forecast,
         )
         properties = SimpleNamespace(in_words=lambda: "mass 300 g")
         runtime = SimpleNamespace(
@@ -69,7 +69,7 @@ class Bench:
 
 def test_a_carry_is_foretold_before_the_squeeze():
     bench = Bench().carry()
-    assert bench.done == ["foretell", "squeeze", "squeeze", "re-orient", "re-orient"]
+    assert bench.done == ["forecast", "squeeze", "squeeze", "re-orient", "re-orient"]
     assert bench.told == []
     assert bench.logged == ["each finger holds the object with 1.20 N"]
 
@@ -97,7 +97,7 @@ def test_what_stays_is_neither_foretold_nor_squeezed(wanted, touching, last):
 
 
 def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
-    assert Bench().carry(weighed=True).done[:3] == ["weigh", "weigh", "foretell"]
+    assert Bench().carry(weighed=True).done[:3] == ["weigh", "weigh", "forecast"]
     refused = Bench(may_weigh=False).carry(weighed=True)
     assert "weigh" not in refused.done
     assert refused.told == [(Level.INFO, "the object is not weighed")]
@@ -106,7 +106,7 @@ def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
 @pytest.mark.parametrize("may_weigh", [False, True])
 def test_a_session_that_cannot_weigh_carries_all_the_same_and_asks_nobody(may_weigh):
     bench = Bench(can_weigh=False, may_weigh=may_weigh).carry(weighed=True)
-    assert bench.done == ["foretell", "squeeze", "squeeze", "re-orient", "re-orient"]
+    assert bench.done == ["forecast", "squeeze", "squeeze", "re-orient", "re-orient"]
     assert bench.told == []
 
 

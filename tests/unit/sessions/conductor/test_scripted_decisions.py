@@ -69,7 +69,7 @@ def test_grasp_taken_back_is_forgotten_by_session_and_estimate() -> None:
     assert world.event_counts[EventKind.CAPTURE_END] == 4
     again = TactileSlam(SlamSettings(particles=200), seed=1)
     for grasp in outcome.grasps:
-        again.step(grasp)
+        again.add_grasp(grasp)
     assert again.world_T_object is not None
     assert slam.world_T_object is not None
     np.testing.assert_array_equal(again.world_T_object.matrix(), slam.world_T_object.matrix())

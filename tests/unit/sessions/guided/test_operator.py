@@ -122,7 +122,7 @@ def test_grasp_is_taken_back_and_the_estimate_with_it(tmp_path: Path) -> None:
     assert [grasp.index for grasp in run.outcome.grasps] == [0, 1]
     again = TactileSlam(SlamSettings(particles=200), seed=1)
     for grasp in run.outcome.grasps:
-        again.step(grasp)
+        again.add_grasp(grasp)
     assert again.world_T_object is not None
     assert run.slam.world_T_object is not None
     np.testing.assert_array_equal(again.world_T_object.matrix(), run.slam.world_T_object.matrix())

@@ -72,7 +72,7 @@ def foretold(table_N, turn_rad, shift_m):
     cycle, _ = grasp_cycle(world)
     cycle._plan = GraspPlan(GraspFrame(0.0, 0.0, 0.3), "radial", 0.03)
     cycle.fingers = SimpleNamespace(balanced_forces_N=lambda touching, force_N: balanced(force_N))
-    forecast = cycle.foretell(Grasp(0, 0, contacts()), turn_rad, np.array([shift_m, 0.0]))
+    forecast = cycle.forecast(Grasp(0, 0, contacts()), turn_rad, np.array([shift_m, 0.0]))
     return cycle, forecast
 
 

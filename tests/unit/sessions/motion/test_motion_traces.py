@@ -56,7 +56,7 @@ def test_a_whole_grasp(name: str) -> None:
         cycle.settle()
         grasp = cycle.capture()
         told["contacts"] = [[c.finger, c.probed, c.force_N, c.point_world_m, c.normal_world] for c in grasp.contacts]
-        told["foretold"] = cycle.foretell(grasp, 0.3, np.array([0.01, -0.005]))
+        told["foretold"] = cycle.forecast(grasp, 0.3, np.array([0.01, -0.005]))
         cycle.squeeze(grasp.touching)
         told["carried"] = cycle.reorient(0.3, np.array([0.01, -0.005]), grasp.touching).matrix()[:3]
         if plan.closing == "pinch":

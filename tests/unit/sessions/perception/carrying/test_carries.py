@@ -207,7 +207,7 @@ def test_a_carry_foretold() -> None:
         for force_N in (0.5, 1.5):
             forces = dict.fromkeys(FINGERS[:4], force_N) | {"TH": 4 * force_N}
             for friction, weight_N in ((Friction(), float("nan")), (Friction(table_N=4.0, half_width_m=0.03), 3.0)):
-                found = intended.foretell(force_N, forces, friction, weight_N)
+                found = intended.forecast(force_N, forces, friction, weight_N)
                 told[f"{name}, {force_N} N, {friction.table_N} N"] = [
                     *vars(found).values(),
                     found.slips,

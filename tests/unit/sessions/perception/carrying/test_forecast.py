@@ -26,7 +26,7 @@ def contacts():
 
 def foretold(friction, weight_N=NOTHING_KNOWN, share=1.0, turn_rad=0.4):
     intended = IntendedCarry.of(contacts(), Pose2(), Pose2(0.02, 0.0, turn_rad), 1.0, 0.02)
-    return intended.foretell(0.8 * share, {f: share * force for f, force in PRESSED.items()}, friction, weight_N)
+    return intended.forecast(0.8 * share, {f: share * force for f, force in PRESSED.items()}, friction, weight_N)
 
 
 def test_a_light_object_is_carried_along():

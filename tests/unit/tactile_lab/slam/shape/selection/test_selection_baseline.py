@@ -10,7 +10,7 @@ from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.model import FittedShape
-from tactile_lab.slam.shape.selection.held_out import foretells_better
+from tactile_lab.slam.shape.selection.held_out import predicts_better
 from tactile_lab.slam.shape.selection.models import fit_shape
 from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape, free_evidence, outline_of
 from tactile_lab.slam.shape.selection.spatial_choice import best_spatial_shape, stray_cost
@@ -118,8 +118,8 @@ def test_held_out_contacts() -> None:
     for step in range(9):
         for length_m in (0.02, 0.05):
             field = solid(20).with_log_parameters(np.log([0.0009, length_m]))
-            values.append(foretells_better(lambda _, step=step: Box(0.0, 1 + 0.02 * step), field, 0.006, None))
-    assert not foretells_better(failing, solid(20), 0.006, None)
+            values.append(predicts_better(lambda _, step=step: Box(0.0, 1 + 0.02 * step), field, 0.006, None))
+    assert not predicts_better(failing, solid(20), 0.006, None)
     assert_baseline("shape/selection/held_out", {"better": values})
 
 

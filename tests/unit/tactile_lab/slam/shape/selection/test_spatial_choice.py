@@ -13,7 +13,7 @@ from tactile_lab.slam.shape.fields.drawn_field import DrawnField
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.metrics.metrics import mesh_errors
-from tactile_lab.slam.shape.selection.held_out import foretells_better
+from tactile_lab.slam.shape.selection.held_out import predicts_better
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, ear_triangles
@@ -198,8 +198,8 @@ def test_faces_that_only_follow_their_own_contacts_are_not_taken() -> None:
     surface = shape.mesh()
     within = distances_to_mesh(surface.vertices, rounded_box_mesh()) < 2 * surface.sigma_m
     assert within[surface.vertices[:, 2] > 0.01].mean() > 0.85
-    assert not foretells_better(Polyhedron.fit, field, 0.006, 0.0)
-    assert foretells_better(Polyhedron.fit, field_on(box_mesh(), 100, seed=3), 0.006, 0.0)
+    assert not predicts_better(Polyhedron.fit, field, 0.006, 0.0)
+    assert predicts_better(Polyhedron.fit, field_on(box_mesh(), 100, seed=3), 0.006, 0.0)
 
 
 def test_a_solid_of_revolution_that_predicts_contacts_better_stands_before_many_small_faces() -> None:

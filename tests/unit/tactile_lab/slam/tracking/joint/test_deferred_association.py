@@ -10,7 +10,7 @@ import pytest
 from drivers.core.contacts import Array
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
-from tactile_lab.slam.tracking.joint.deferred_association import associate_deferred, hear_again
+from tactile_lab.slam.tracking.joint.deferred_association import associate_deferred, readmit_contacts
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
 from tactile_lab.slam.tracking.joint.proposals import ProposalSettings
 from tests.support.simulated_contacts import true_map
@@ -80,11 +80,11 @@ def test_a_side_that_was_left_out_as_a_whole_is_heard_again(known: ContactMap) -
     ]
     without = replace(known, placed=tuple(grasps)).with_best_kernel()
     assert without.left_out_count > 5
-    (found,) = hear_again(JUDGE.score(without), JUDGE)
+    (found,) = readmit_contacts(JUDGE.score(without), JUDGE)
     assert found.map.left_out_count == 0
     assert found.cost < JUDGE.score(without).cost - 20
     assert np.median(np.linalg.norm(found.map.rows[:, :2] - known.rows[:, :2], axis=1)) < 0.004
 
 
 def test_nothing_is_heard_where_all_contacts_are_used(known: ContactMap) -> None:
-    assert hear_again(JUDGE.score(known.with_all_contacts()), JUDGE) == []
+    assert readmit_contacts(JUDGE.score(known.with_all_contacts()), JUDGE) == []
