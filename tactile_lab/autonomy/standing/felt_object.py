@@ -127,7 +127,7 @@ class FeltObject:
         self.add(points_m, normals)
 
     def on_looked(self, places_m: Sequence[Array]) -> None:
-        """Something was looked for at these places, (3,) each, world, found or not: they are no longer new."""
+        """Something was looked for at these places, (3,) each, world: they are no longer new."""
         self._looked_m += places_m
 
     # --- what is known -----------------------------------------------------------------------------------------
@@ -165,7 +165,7 @@ class FeltObject:
         return [float(np.clip(yaw, low, high)) for yaw in yaws if low - askew_rad <= yaw <= high + askew_rad]
 
     def distances_m(self, places_m: Array) -> Array:
-        """Of places (n, 3) to the nearest where a contact was or was looked for, shape (n,), at most 40 mm."""
+        """Of places (n, 3) to the nearest where a contact was, or was looked for in vain, shape (n,), at most 40 mm."""
         looked_m = np.array([*self._points_m, *self._looked_m]).reshape(-1, 3)
         if not len(looked_m):
             return np.full(len(places_m), _FAR_m)

@@ -93,13 +93,14 @@ class StandingPlanner:
         return None if best is None else best.plan
 
     def on_grasp(self, grasp: Grasp) -> None:
-        """Take note of contacts, and of where they were expected: the same again would hardly be elsewhere."""
+        """Take note of contacts, and of where none was."""
         self.felt.on_grasp(grasp)
         if (done := self._current) is None:
             return
         self._touches += done.plan.only_touch
+        touched = frozenset() if done.plan.only_touch else grasp.touching
         self.whereabouts.on_grasp(grasp, done, approach_of(done.plan, self.hand))
-        self.felt.on_looked(list(done.touches.values()))
+        self.felt.on_looked([place for finger, place in done.touches.items() if finger not in touched])
 
     def on_estimate(self, is_placed: bool, points_m: Array, normals: Array, motion: Pose2) -> None:
         """Take note whether the contacts of the last grasp fit what was felt before, and where all are placed by now.

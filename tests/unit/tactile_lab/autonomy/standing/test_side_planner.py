@@ -106,20 +106,6 @@ def test_next_grasp_is_where_nothing_was_touched_until_nothing_is_left() -> None
     assert "mm high" in beside.exhausted
 
 
-def test_a_grasp_whose_contacts_are_elsewhere_than_expected_is_not_planned_again() -> None:
-    beside, done = planner(box()), []
-    for _ in range(30):
-        plan = beside.plan()
-        if plan is None or (expected := beside._current) is None:
-            break
-        assert (plan.closing, plan.height_m, plan.frame) not in done
-        done.append((plan.closing, plan.height_m, plan.frame))
-        higher_m = expected.touches_m + np.array([0.0, 0.0, 0.015])
-        beside.on_grasp(grasp(higher_m, list(expected.touches)))
-    assert plan is None
-    assert len(done) > 5
-
-
 def meet_one(beside: StandingPlanner, *, is_placed: bool) -> bool:
     """The next grasp, of which one finger meets something; whether there was one."""
     if beside.plan() is None or (expected := beside._current) is None:
