@@ -20,7 +20,7 @@ from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import rotate, spatial, transform_points
 from drivers.shadow.closing.posture import HandShape
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
-from tactile_lab.experiments.reachable import ANY_YAW_rad, are_in_reach
+from tactile_lab.experiments.runs.reachable import ANY_YAW_rad, are_in_reach
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
