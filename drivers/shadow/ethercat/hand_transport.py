@@ -276,8 +276,7 @@ class EthercatTransport:
                 self._counts.restarts += 1
                 self._ring.resume(self.hand.image)
             elif status.state != AlState.OP or status.error:
-                hint = "Check its power and cable, then connect again"
-                raise DeviceError(f"the {name} has left operation: it is in {status}", where=self.name, hint=hint)
+                raise DeviceError(f"the {name} has left operation: it is in {status}", where=self.name)
 
     def _fail(self, what: str) -> None:
         self._failure = DeviceError(what, where=self.name, hint="Check power and cable, then connect again")

@@ -155,12 +155,12 @@ def _postures(hand: HandShape) -> Iterator[_Posture]:
 def _closing_postures(table: Closing, around_m: float, hand: HandShape) -> Iterator[_Posture]:
     """Each finger closed so far, the others open; so far higher or lower."""
     usable = link_balls(table.name, table.height_m, hand).usable
-    opened = open_hand(table.name, table.height_m, hand)
+    opened, first = open_hand(table.name, table.height_m, hand), np.argmax(usable, axis=0)
     for index, finger in enumerate(table.fingers):
         path = table.path(finger)
         for node in _NODES:
             if usable[node, index]:
-                nodes = np.argmax(usable, axis=0)
+                nodes = first.copy()
                 nodes[index] = node
                 height_m = float(path.centre_m(PROGRESS[node])[2])
                 parts = _parts(table, nodes, index, hand)
