@@ -273,7 +273,8 @@ class Conductor:
         self._landings_m = [] if arrived else [*self._landings_m, *self._cycle.landings_world_m]
         if not arrived:
             landings = len(self._cycle.landings_world_m)
-            self._tell(Level.WARNING, f"the hand landed on the object {landings} times: trying another grasp")
+            often = "once" if landings == 1 else f"{landings} times"
+            self._tell(Level.WARNING, f"the hand landed on the object {often}: trying another grasp")
         return arrived
 
     def _carry(self, grasp: Grasp, wanted: Reorientation) -> None:

@@ -75,6 +75,12 @@ def _limit(settings: list[Setting], name: str, values: Sequence[str]) -> list[Se
         raise ConfigurationError(f"{name!r} is not a varied setting", where="--only", hint=hint)
     known = list(dict.fromkeys(str(dict(setting)[name]) for setting in settings))
     if unknown := [value for value in values if value not in known]:
-        hint = f"Choose from {', '.join(known)}"
-        raise ConfigurationError(f"no {name} {', '.join(map(repr, unknown))}", where="--only", hint=hint)
+        raise ConfigurationError(f"no {name} {', '.join(map(repr, unknown))}", where="--only", hint=_choice(known))
     return [setting for setting in settings if str(dict(setting)[name]) in values]
+
+
+def _choice(values: Sequence[str]) -> str:
+    """What can be chosen, separated as the option separates it."""
+    if any("," in value for value in values):
+        return f"Choose from {'; '.join(values)}. They contain commas: separate or end them by ;"
+    return f"Choose from {', '.join(values)}"

@@ -39,3 +39,11 @@ def test_unknown_names_are_refused_with_those_there_are() -> None:
         experiment("methods-2d").cells(only={"colour": ["red"]})
     with pytest.raises(ConfigurationError, match="octagon"):
         experiment("methods-2d").cells(only={"shape": ["octagon"]})
+
+
+def test_values_with_commas_are_offered_as_the_option_takes_them() -> None:
+    study = experiment("thesis-readings")
+    with pytest.raises(ConfigurationError) as caught:
+        study.cells(only={"part": ["gate", "thin plate kernel"]})
+    assert "gate, thin plate kernel; " in str(caught.value.hint)
+    assert "end them by ;" in str(caught.value.hint)
