@@ -53,40 +53,47 @@ def contact_on_ellipsoid(force_N: Array, moment_centre_Nm: Array, semi_axes_m: A
     with K and (f . m) / K computed by the form that does not cancel, both stay exact through f . m = 0.
     """
     f, m = np.asarray(force_N, float), np.asarray(moment_centre_Nm, float)
-    a = 1.0 / np.asarray(semi_axes_m, float)
+    semi = np.asarray(semi_axes_m, float)
+    a = 1.0 / semi
     det = float(np.prod(a))
-    along = np.sum(f * m, axis=-1)
-    scaled_force_squared = np.sum((a * f) ** 2, axis=-1)
-    twist, ratio = _twist(along, det**2 * np.sum((m / a) ** 2, axis=-1), scaled_force_squared, det)
+    along, scaled_f, scaled_m = _dot(f, m), a * f, semi * m
+    force_squared, scaled_force_squared = _dot(f, f), _dot(scaled_f, scaled_f)
     with np.errstate(invalid="ignore", divide="ignore"):
-        numerator = (twist * det**2)[..., None] * m / a**2 + np.cross(a**2 * f, m) + ratio[..., None] * f
+        twist, ratio = _twist(along, det**2 * _dot(scaled_m, scaled_m), scaled_force_squared, det)
+        numerator = (twist * det**2)[..., None] * semi * scaled_m + _cross(a * scaled_f, m) + ratio[..., None] * f
         point = numerator / (twist**2 * det**2 + scaled_force_squared)[..., None]
         point = np.where((scaled_force_squared > 0)[..., None], point, np.nan)
         gradient = a**2 * point
-        normal = gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
-        cosine = -np.sum(f * normal, axis=-1) / np.linalg.norm(f, axis=-1)
-    torsion = np.sum((m - np.cross(point, f)) * normal, axis=-1)
-    distance = _axis_distance(f, m, a, along)
-    return EllipsoidContact(point, normal, torsion, twist, distance, np.arccos(np.clip(cosine, -1.0, 1.0)))
+        normal = gradient / np.sqrt(_dot(gradient, gradient))[..., None]
+        cosine = -_dot(f, normal) / np.sqrt(force_squared)
+        across = scaled_m - (along / force_squared)[..., None] * (semi * f)
+        # A r0 x A f = det(A) A^-1 (r0 x f) for r0 on the axis: the lever arm where the surface is a unit sphere.
+        distance = det * np.sqrt(_dot(across, across)) / np.sqrt(scaled_force_squared)
+    torsion = _dot(m - _cross(point, f), normal)
+    angle_rad = np.arccos(np.minimum(np.maximum(cosine, -1.0), 1.0))
+    return EllipsoidContact(point, normal, torsion, twist, np.asarray(distance), np.asarray(angle_rad))
 
 
 def _twist(along: Array, moment_squared: Array, force_squared: Array, det: float) -> tuple[Array, Array]:
     """K and (f . m) / K, each by the form that subtracts nothing: sigma > 0 twisting, sigma < 0 pressing."""
-    sigma = moment_squared - force_squared
-    root = np.sqrt(sigma**2 + (2.0 * det * along) ** 2)
-    larger = np.sqrt((root + np.abs(sigma)) / 2.0)
-    sign = np.where(along < 0, 1.0, -1.0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        twist = sign * np.where(sigma > 0, larger / det, np.abs(along) / larger)
-        ratio = -np.where(sigma > 0, np.abs(along) * det / larger, larger)
-    return np.nan_to_num(twist), np.nan_to_num(ratio)
+    sigma, along_size = moment_squared - force_squared, np.abs(along)
+    larger = np.sqrt((np.sqrt(sigma**2 + (2.0 * det * along) ** 2) + np.abs(sigma)) / 2.0)
+    by_larger = along_size / np.maximum(larger, np.finfo(float).tiny)
+    twists = sigma > 0
+    twist = np.where(along < 0, 1.0, -1.0) * np.where(twists, larger / det, by_larger)
+    return np.asarray(twist), np.asarray(-np.where(twists, det * by_larger, larger))
 
 
-def _axis_distance(f: Array, m: Array, a: Array, along: Array) -> Array:
-    """A r0 x A f = det(A) A^-1 (r0 x f) for r0 on the axis: the lever arm where the surface is a unit sphere."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        across = m - (along / np.sum(f**2, axis=-1))[..., None] * f
-        return np.asarray(np.prod(a) * np.linalg.norm(across / a, axis=-1) / np.linalg.norm(a * f, axis=-1))
+def _dot(u: Array, v: Array) -> Array:
+    return np.asarray(np.einsum("...i,...i->...", u, v))
+
+
+def _cross(u: Array, v: Array) -> Array:
+    """As numpy's, which takes longer than everything else for the few rows of a carry."""
+    product = np.empty(u.shape)
+    for axis, (after, before) in enumerate(((1, 2), (2, 0), (0, 1))):
+        product[..., axis] = u[..., after] * v[..., before] - u[..., before] * v[..., after]
+    return product
 
 
 def contact_jacobian(contact: EllipsoidContact, force_N: Array, semi_axes_m: Array) -> Array:

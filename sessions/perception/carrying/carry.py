@@ -243,6 +243,8 @@ def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, Continuo
     wired = [finger in fingertips for finger in FINGERS]
     poorly = (steps.felt.sum(axis=1) < 2) | (steps.is_void & wired).any(axis=1)
     doubt = np.maximum(poorly, _resistance(steps))
+    if not doubt.any():
+        return np.zeros(2)
     moves = planar_matrices(steps.world_T_palm)
     shifts = np.einsum("nij,nj->ni", moves[:, :2, :2], centres_m) + moves[:, :2, 2] - centres_m
     return np.array([np.linalg.norm(shifts, axis=1) @ doubt, _turns_rad(steps) @ doubt])

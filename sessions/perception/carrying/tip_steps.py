@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import FINGERS, LARGEST_SLOPE, Array
-from drivers.core.fingertip import ContinuousFingertip
+from drivers.core.fingertip import ContinuousFingertip, TipTouches
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix, palm_T_distal_matrices
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples, SAMPLE_ns
@@ -36,7 +36,7 @@ class TipSteps:
     Attributes:
         points_m: contact points in the middle of each step, shape (n, 5, 3).
         normals: unit normals out of the object, shape (n, 5, 3).
-        moves_m: motion of the fingertip's material at the contact, shape (n, 5, 3).
+        moves_m: motion of the fingertip's material at the contact, without one of its frame, shape (n, 5, 3).
         forces_N: normal forces, shape (n, 5); zero without an informative contact.
         sinking: how much deeper each fingertip sinks in, in units of its give (:func:`_sinking`), shape (n, 5).
         tangential_N: forces along the surface, shape (n, 5); zero likewise.
@@ -68,41 +68,43 @@ class TipSteps:
 
 def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> TipSteps:
     """The steps of a carry, from its samples."""
-    joints_rad = _smooth(samples.joints_rad, _JOINT_SMOOTHING_s)
-    world_T_palm = samples.world_T_forearm @ forearm_T_palm_matrix(joints_rad, side)
-    world_T_distal = world_T_palm[:, None] @ palm_T_distal_matrices(joints_rad, side)
-    chosen = np.arange(0, len(joints_rad), STEP_SAMPLES)
-    frames, readings = world_T_distal[chosen], _smooth_known(samples.readings)[chosen[:-1]]
-    shape = (len(chosen) - 1, len(FINGERS))
-    points_m, normals, moves_m = (np.zeros((*shape, 3)) for _ in range(3))
-    forces_N, tangential_N, is_void = np.zeros(shape), np.zeros(shape), np.ones(shape, dtype=bool)
-    net_forces_N = np.zeros((shape[0], 3))
-    for finger, tip in fingertips.items():
-        at = FINGERS.index(finger)
-        before, after = frames[:-1, at], frames[1:, at]
-        touches = tip.touches(readings[:, at], before[:, :3, :3])
-        starts, ends = (_transform(each, touches.points_distal_m) for each in (before, after))
-        points_m[:, at], moves_m[:, at] = (starts + ends) / 2, ends - starts
-        normals[:, at] = _middle_normals(before, after, touches.normals_distal)
-        steep = np.linalg.norm(normals[:, at, :2], axis=-1) > LARGEST_SLOPE
-        forces_N[:, at] = np.where(touches.is_certain & steep, np.maximum(touches.normal_forces_N, 0.0), 0.0)
-        along_N = np.sum(touches.forces_distal_N**2, axis=-1) - touches.normal_forces_N**2
-        tangential_N[:, at] = np.where(forces_N[:, at] > 0.0, np.sqrt(np.maximum(along_N, 0.0)), 0.0)
-        net_forces_N -= np.einsum("nij,nj->ni", before[:, :3, :3], touches.forces_distal_N)
-        is_void[:, at] = touches.is_void
-    seconds = np.diff(samples.stamps_ns[chosen]) / NANOSECONDS
+    chosen = np.arange(0, len(samples.joints_rad), STEP_SAMPLES)
+    joints_rad = _smooth(samples.joints_rad, _JOINT_SMOOTHING_s)[chosen]
+    world_T_palm = samples.world_T_forearm[chosen] @ forearm_T_palm_matrix(joints_rad, side)
+    frames = world_T_palm[:, None] @ palm_T_distal_matrices(joints_rad, side)
+    felt = _felt(_smooth_known(samples.readings)[chosen[:-1]], frames[:-1, ..., :3, :3], fingertips)
+    before, after = frames[:-1], frames[1:]
+    starts, ends = (_transform(each, felt.points_distal_m) for each in (before, after))
+    normals = _middle_normals(before, after, felt.normals_distal)
+    steep = normals[..., 0] ** 2 + normals[..., 1] ** 2 > LARGEST_SLOPE**2
+    forces_N = np.where(felt.is_certain & steep, np.maximum(felt.normal_forces_N, 0.0), 0.0)
+    along_N = np.sum(felt.forces_distal_N**2, axis=-1) - felt.normal_forces_N**2
     return TipSteps(
-        points_m=points_m,
+        points_m=(starts + ends) / 2,
         normals=normals,
-        moves_m=moves_m,
+        moves_m=ends - starts,
         forces_N=forces_N,
         sinking=_sinking(forces_N),
-        tangential_N=tangential_N,
-        net_forces_N=net_forces_N,
-        is_void=is_void,
-        world_T_palm=world_T_palm[chosen],
-        step_s=seconds,
+        tangential_N=np.where(forces_N > 0.0, np.sqrt(np.maximum(along_N, 0.0)), 0.0),
+        net_forces_N=-np.einsum("nfij,nfj->ni", before[..., :3, :3], felt.forces_distal_N),
+        is_void=felt.is_void,
+        world_T_palm=world_T_palm,
+        step_s=np.diff(samples.stamps_ns[chosen]) / NANOSECONDS,
     )
+
+
+def _felt(readings: Array, world_R_distal: Array, fingertips: Mapping[str, ContinuousFingertip]) -> TipTouches:
+    """What all five felt, with (n, 5) in front of their shapes; a finger without such a fingertip is void."""
+    shape = readings.shape[:2]
+    points_m, normals, forces_N = (np.zeros((*shape, 3)) for _ in range(3))
+    no, yes = np.zeros(shape, dtype=bool), np.ones(shape, dtype=bool)
+    felt = TipTouches(points_m, normals, np.zeros(shape), forces_N, no, yes)
+    for finger, tip in fingertips.items():
+        at = FINGERS.index(finger)
+        touches = tip.touches(readings[:, at], world_R_distal[:, at])
+        for name in TipTouches.__dataclass_fields__:
+            getattr(felt, name)[:, at] = getattr(touches, name)
+    return felt
 
 
 def _sinking(forces_N: Array) -> Array:
@@ -117,12 +119,12 @@ def _sinking(forces_N: Array) -> Array:
 
 
 def _transform(frames: Array, points: Array) -> Array:
-    return np.asarray(np.einsum("nij,nj->ni", frames[:, :3, :3], points) + frames[:, :3, 3])
+    return np.asarray((frames[..., :3, :3] @ points[..., None])[..., 0] + frames[..., :3, 3])
 
 
 def _middle_normals(before: Array, after: Array, normals_distal: Array) -> Array:
     """Normals turned by half of the step, unit length; zero where there is none."""
-    turned = np.einsum("nij,nj->ni", before[:, :3, :3] + after[:, :3, :3], normals_distal)
+    turned = ((before[..., :3, :3] + after[..., :3, :3]) @ normals_distal[..., None])[..., 0]
     return np.asarray(turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-12))
 
 
