@@ -28,7 +28,7 @@ class SessionFacts:
     """The session's manifest as text for people.
 
     Attributes:
-        object_name: the object's catalogue name or the name the operator gave.
+        headline: the object as people call it; a mesh by its file's name alone.
         rig: name of the rig.
         started: date and time, ISO 8601, or "" with a virtual clock.
         status: closed, interrupted, failed or recovered.
@@ -38,7 +38,7 @@ class SessionFacts:
         calibrations: file name and hash of each calibration copy.
     """
 
-    object_name: str
+    headline: str
     rig: str
     started: str = ""
     status: str = "closed"

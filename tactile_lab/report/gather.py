@@ -13,6 +13,7 @@ from drivers.core.contacts import Array
 from drivers.core.poses import spatial, transform_points
 from sessions.recording.manifest import Manifest
 from sessions.recording.session import Session
+from sessions.recording.session_ids import headline
 from tactile_lab.evaluation.estimate_with_truth import Truth, true_outline
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.plain import read_json_object
@@ -69,13 +70,14 @@ def facts(manifest: Manifest) -> SessionFacts:
     plain_settings = {name: value for name, value in manifest.settings.items() if not isinstance(value, dict)}
     made_with = [
         ("session", manifest.name),
+        ("object", manifest.object_name),
         *(("origin", step.words) for step in manifest.derived),
         *((f"seed: {name}", str(seed)) for name, seed in manifest.seeds.items()),
         *((f"setting: {name}", str(value)) for name, value in plain_settings.items()),
         *((f"version: {name}", number) for name, number in manifest.versions.items()),
     ]
     return SessionFacts(
-        object_name=manifest.object_name,
+        headline=headline(manifest.object_name),
         rig=manifest.rig,
         started=manifest.started_utc.replace("T", " ").replace("+00:00", " UTC"),
         status=manifest.status,

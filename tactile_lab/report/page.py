@@ -12,7 +12,7 @@ POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-s
 
 def page(content: ReportContent) -> str:
     """The report as one self-contained HTML document."""
-    title = f"{content.facts.object_name} · tactile SLAM"
+    title = f"{content.facts.headline} · tactile SLAM"
     head = element(
         "head",
         Markup('<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'),

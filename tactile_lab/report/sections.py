@@ -43,7 +43,7 @@ def head(content: ReportContent) -> Markup:
         element(
             "div",
             element("p", "Tactile SLAM session", class_="kicker"),
-            element("h1", facts.object_name),
+            element("h1", facts.headline),
             element("p", line, class_="facts"),
             *notes,
         ),
