@@ -53,7 +53,7 @@ def mesh_figures(mesh: SurfaceMesh | None, truth: trimesh.Trimesh, *, upright: b
         return dict(NO_SHAPE)
     fit = align_meshes(mesh, truth, upright=upright)
     covered = _within(distances_to_mesh(transform_points(fit, mesh.vertices), truth), mesh.sigma_m)
-    judged = mesh_consistency(mesh, mesh.sigma_m, truth, fit)
+    judged = mesh_consistency(mesh, mesh.sigma_m, truth, fit, upright=upright)
     return _shape_figures(mesh_errors(mesh, truth, fit), covered, mesh.is_closed, judged)
 
 

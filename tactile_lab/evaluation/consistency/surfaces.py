@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from gtsam import Pose2, Pose3
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 from scipy.special import ndtri
 
 from drivers.core.contacts import Array
@@ -21,9 +23,14 @@ from tactile_lab.slam.shape.surfaces.sampling import (
     sample_mesh_with_values,
     sample_polygon_with_values,
 )
+from tactile_lab.slam.shape.surfaces.surface import RESOLUTION_m
 
 _LEAST_SIGMA_m = 1e-6
 _STEP_m, _SAMPLES = 0.0005, 20_000
+_FITTED = 1000
+"""About so many samples determine the best fit."""
+
+_LEVER_m = 0.05
 
 
 @dataclass(frozen=True)
@@ -64,22 +71,64 @@ def surface_consistency(signed_m: Array, sigma_m: Array) -> SurfaceConsistency:
 
 def outline_consistency(points_m: Array, sigma_m: Array, truth_m: Array, truth_T_estimate: Pose2) -> SurfaceConsistency:
     """Judge a closed outline, shape (n, 2), with its standard deviations, shape (n,), by the true one, shape (m, 2)."""
+    return surface_consistency(*outline_errors(points_m, sigma_m, truth_m, truth_T_estimate))
+
+
+def outline_errors(points_m: Array, sigma_m: Array, truth_m: Array, truth_T_estimate: Pose2) -> tuple[Array, Array]:
+    """Signed errors of samples spread evenly over an outline, and their standard deviations, each of shape (q,).
+
+    Errors are those left by the rigid motion near the given one for which they are least, each counted by its standard
+    deviation: a part that is said to be a guess must not displace the others.
+    """
     samples_m, stated_m = sample_polygon_with_values(points_m, sigma_m, _STEP_m)
-    moved = transform_points(spatial(truth_T_estimate), np.pad(samples_m, ((0, 0), (0, 1))))[:, :2]
-    outside = np.where(_inside_polygon(moved, truth_m), -1.0, 1.0)
-    return surface_consistency(outside * distances_to_polygon(moved, truth_m), stated_m)
+
+    def signed_m(places_m: Array) -> Array:
+        outside = np.where(_inside_polygon(places_m[:, :2], truth_m), -1.0, 1.0)
+        return np.asarray(outside * distances_to_polygon(places_m[:, :2], truth_m))
+
+    moved = transform_points(spatial(truth_T_estimate), np.pad(samples_m, ((0, 0), (0, 1))))
+    return signed_m(_settled(moved, stated_m, signed_m, upright=True)), stated_m
 
 
 def mesh_consistency(
-    mesh: TriangleMesh, sigma_m: Array, truth: TriangleMesh, truth_T_estimate: Pose3
+    mesh: TriangleMesh, sigma_m: Array, truth: TriangleMesh, truth_T_estimate: Pose3, *, upright: bool = True
 ) -> SurfaceConsistency:
     """Judge a mesh with a standard deviation at each vertex, shape (n,), by the true one."""
+    return surface_consistency(*mesh_errors(mesh, sigma_m, truth, truth_T_estimate, upright=upright))
+
+
+def mesh_errors(
+    mesh: TriangleMesh, sigma_m: Array, truth: TriangleMesh, truth_T_estimate: Pose3, *, upright: bool = True
+) -> tuple[Array, Array]:
+    """As :func:`outline_errors`, of a mesh; ``upright`` restricts the motion to one on the table."""
     import igl  # here, so that importing this module stays quick
 
     samples_m, stated_m = sample_mesh_with_values(mesh, sigma_m, _SAMPLES)
-    moved = np.ascontiguousarray(transform_points(truth_T_estimate, samples_m))
-    within = np.asarray(igl.fast_winding_number(*mesh_arrays(truth), moved)) > 0.5
-    return surface_consistency(np.where(within, -1.0, 1.0) * distances_to_mesh(moved, truth), stated_m)
+    solid = mesh_arrays(truth)
+
+    def signed_m(places_m: Array) -> Array:
+        places_m = np.ascontiguousarray(places_m)
+        within = np.asarray(igl.fast_winding_number(*solid, places_m)) > 0.5
+        return np.asarray(np.where(within, -1.0, 1.0) * distances_to_mesh(places_m, truth))
+
+    moved = transform_points(truth_T_estimate, samples_m)
+    return signed_m(_settled(moved, stated_m, signed_m, upright=upright)), stated_m
+
+
+def _settled(places_m: Array, sigma_m: Array, signed_m: Callable[[Array], Array], *, upright: bool) -> Array:
+    """Places of shape (n, 3) after the small rigid motion that makes their errors least, by what is stated of them."""
+    some = slice(None, None, max(1, len(places_m) // _FITTED))
+    middle_m, weights = places_m.mean(axis=0), 1 / np.hypot(sigma_m[some], RESOLUTION_m)
+    motion = np.eye(6)[[0, 1, 5]] if upright else np.eye(6)
+
+    def moved(given_m: Array, step_m: Array) -> Array:
+        shift_m, turn = np.split(step_m @ motion, 2)
+        return np.asarray(Rotation.from_rotvec(turn / _LEVER_m).apply(given_m - middle_m) + middle_m + shift_m)
+
+    def weighed(step_m: Array) -> Array:
+        return np.asarray(signed_m(moved(places_m[some], step_m)) * weights)
+
+    return moved(places_m, least_squares(weighed, np.zeros(len(motion)), method="lm", xtol=1e-5).x)
 
 
 def _inside_polygon(points_m: Array, polygon_m: Array) -> NDArray[np.bool_]:

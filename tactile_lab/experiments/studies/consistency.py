@@ -7,12 +7,19 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from drivers.core.poses import spatial, transform_points
+from tactile_lab.evaluation.consistency.surfaces import mesh_errors, outline_errors
 from tactile_lab.evaluation.registration import FAILURE_LIMIT_MM
+from tactile_lab.evaluation.truth.rotational_symmetry import stands
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data import planar_data, second_family, spatial_data
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
-from tactile_lab.experiments.data.sensing import SimulatedGrasps, by_biased_fingers, without_paths
+from tactile_lab.experiments.data.sensing import (
+    SimulatedGrasps,
+    SLIP_SIGMA_m,
+    SLIP_SIGMA_rad,
+    by_biased_fingers,
+    without_paths,
+)
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
@@ -21,17 +28,19 @@ from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, 
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
-from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
-FIRST, SECOND, FINGERS = "first", "second", "fingers"
-"""The families of simulated contacts: :mod:`planar_data` and :mod:`spatial_data`; :mod:`second_family`; and the first
-with an error that each finger has throughout a session, as the simulated rig's have.
+FIRST, SECOND, FINGERS, HELD = "first", "second", "fingers", "held"
+"""The families of simulated contacts: :mod:`planar_data` and :mod:`spatial_data`; :mod:`second_family`; the first with
+an error that each finger has throughout a session, as the simulated rig's have; and the first on solids held free in
+space, with six degrees of freedom, as in experiment ``methods-6dof``.
 """
 
 PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")
 SOLIDS = ("box-12x6x6", "l-block", "cylinder", "ellipsoid")
+HELD_SOLIDS = ("box-12x6x6", "triangular-prism", "l-block", "ellipsoid")
+_HELD_MOTION = 0.5
 _MORE_GRASPS_IN_SPACE = 1.5
 _FAR_SIGMAS, _FAR_SHARE = 5.0, 0.01
 """A shape is off if more than this share of it is farther from the truth than so many stated standard deviations."""
@@ -40,11 +49,11 @@ _FAR_SIGMAS, _FAR_SHARE = 5.0, 0.01
 def _settings(grasps: int) -> list[Setting]:
     shapes = {(FIRST, 2): PLANAR_SHAPES, (FIRST, 3): SOLIDS, (SECOND, 2): second_family.SHAPES}
     shapes[SECOND, 3] = second_family.SHAPES
-    shapes |= {(FINGERS, 2): PLANAR_SHAPES, (FINGERS, 3): SOLIDS}
+    shapes |= {(FINGERS, 2): PLANAR_SHAPES, (FINGERS, 3): SOLIDS, (HELD, 3): HELD_SOLIDS}
     return [
         setting
         for (family, dimension), names in shapes.items()
-        for wrong in ((0,) if family == FINGERS else (0, 10))
+        for wrong in ((0, 10) if family in (FIRST, SECOND) else (0,))
         for setting in grid(family=[family], dimension=[dimension], wrong=[wrong], shape=names, grasps=[grasps])
     ]
 
@@ -56,9 +65,7 @@ def assessed_run(cell: Cell) -> dict[str, Any]:
     Approach paths are unknown where contacts are wrong.
     """
     data = _data(cell)
-    palm_m = second_family.PALM_SIGMA_m if cell["family"] == SECOND else 0.0
-    settings = SlamSettings(dimension=cell["dimension"], motion=MotionNoise(palm_m=palm_m))
-    slam = TactileSlam(settings, cell.seed)
+    slam = TactileSlam(_slam_settings(cell), cell.seed)
     for grasp in data.grasps:
         slam.add_grasp(grasp)
     result = slam.finish()
@@ -77,6 +84,14 @@ def assessed_run(cell: Cell) -> dict[str, Any]:
     }
 
 
+def _slam_settings(cell: Cell) -> SlamSettings:
+    if cell["family"] == HELD:
+        motion = MotionNoise(translation_m=_HELD_MOTION * SLIP_SIGMA_m, rotation_rad=_HELD_MOTION * SLIP_SIGMA_rad)
+        return SlamSettings(dimension=3, freedom="space", motion=motion)
+    palm_m = second_family.PALM_SIGMA_m if cell["family"] == SECOND else 0.0
+    return SlamSettings(dimension=cell["dimension"], motion=MotionNoise(palm_m=palm_m))
+
+
 def _data(cell: Cell) -> PlanarGrasps | SpatialGrasps:
     flat, wrong = cell["dimension"] == 2, cell["wrong"] / 100
     count = cell["grasps"] if flat else round(_MORE_GRASPS_IN_SPACE * cell["grasps"])
@@ -89,6 +104,8 @@ def _data(cell: Cell) -> PlanarGrasps | SpatialGrasps:
         corners = found.body.triangles_m
         mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
         return SpatialGrasps(found.shape, found.grasps, found.world_T_body, mesh)
+    if cell["family"] == HELD:
+        return spatial_data.simulate(cell["shape"], cell.seed, motion="free", motion_scale=_HELD_MOTION, count=count)
     simulate = planar_data.simulate if flat else spatial_data.simulate
     data: PlanarGrasps | SpatialGrasps = simulate(cell["shape"], cell.seed, count=count, outlier_share=wrong)
     if cell["family"] == FINGERS:
@@ -99,18 +116,21 @@ def _data(cell: Cell) -> PlanarGrasps | SpatialGrasps:
 def _far_share(data: SimulatedGrasps, result: SlamResult) -> float:
     """Share of the estimated shape that is many stated standard deviations off, at the best fit; 1 without a shape."""
     if isinstance(data, PlanarGrasps) and result.contour is not None:
-        fit = align_contours(result.contour.points_m, data.outline_m)
-        points = transform_points(spatial(fit), np.pad(result.contour.points_m, ((0, 0), (0, 1))))[:, :2]
-        errors_m, sigma_m = distances_to_polygon(points, data.outline_m), result.contour.sigma_m
+        outline, truth = result.contour, data.outline_m
+        fit = align_contours(outline.points_m, truth)
+        errors_m, sigma_m = outline_errors(outline.points_m, outline.sigma_m, truth, fit)
     elif isinstance(data, SpatialGrasps) and result.mesh is not None:
-        moved = transform_points(align_meshes(result.mesh, data.mesh, upright=True), result.mesh.vertices)
-        errors_m, sigma_m = distances_to_mesh(moved, data.mesh), result.mesh.sigma_m
+        upright = all(map(stands, data.world_T_body))
+        fitted = align_meshes(result.mesh, data.mesh, upright=upright)
+        errors_m, sigma_m = mesh_errors(result.mesh, result.mesh.sigma_m, data.mesh, fitted, upright=upright)
     else:
         return 1.0
-    return float(np.mean(errors_m > _FAR_SIGMAS * sigma_m))
+    return float(np.mean(np.abs(errors_m) > _FAR_SIGMAS * sigma_m))
 
 
 def _where(cell: Cell) -> str:
+    if cell["family"] == HELD:
+        return "held free"
     return "in the plane" if cell["dimension"] == 2 else "in space"
 
 
@@ -120,7 +140,7 @@ def _panel(cell: Cell) -> str:
 
 CONSISTENCY = Experiment(
     "consistency",
-    "Whether the uncertainties that the default method states are true, on three families of simulated contacts.",
+    "Whether the uncertainties that the default method states are true, on four families of simulated contacts.",
     _settings,
     assessed_run,
     (

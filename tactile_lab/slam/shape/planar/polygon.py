@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
@@ -21,6 +22,10 @@ LEAST_FACES = 3
 
 BRIDGE = -1
 """Face number of parts of the outline that no face covers."""
+
+
+_BEFORE_CORNER = 1 - 1e-9
+"""Of an edge: a corner belongs to the edge that begins there."""
 
 
 class Polygon:
@@ -130,6 +135,21 @@ class Polygon:
                 away_m = np.linalg.norm(places_m - self.outline_m[vertex], axis=1)
                 hidden_m2 += cut.variance_m2(away_m, after=vertex == edge)
         return hidden_m2
+
+    def covariance_m2(self, places_m: Array) -> Array:
+        """Covariance of displacements along the normals at places on the outline, shapes (q, 2) and (q, q).
+
+        That of the faces: bridges and what may be hidden at corners have no part in it.
+        """
+        moves = self.uncertainty.displacements_m(self._faces_at(places_m), places_m)
+        return np.asarray(moves @ moves.T)
+
+    def _faces_at(self, places_m: Array) -> NDArray[np.int64]:
+        """Face of the nearest edge, that after a corner at the corner itself, shape (q,)."""
+        edges = np.roll(self.outline_m, -1, axis=0) - self.outline_m
+        along = np.einsum("qkd,kd->qk", places_m[:, None] - self.outline_m, edges) / np.sum(edges**2, axis=1)
+        feet = self.outline_m + np.clip(along, 0.0, _BEFORE_CORNER)[..., None] * edges
+        return np.asarray(self.edge_faces[np.linalg.norm(places_m[:, None] - feet, axis=2).argmin(axis=1)])
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
         """Raises ShapeError: an outline has no surface."""

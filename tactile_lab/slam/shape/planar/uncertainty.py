@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.planar.segmentation import Faces, PlanarContacts
@@ -58,6 +59,21 @@ class FaceUncertainty:
         """Variance along the normal of points of shape (q, 2) on a face, shape (q,)."""
         levers = self._levers_m(face, places_m)
         return np.asarray(self.offset_variances_m2[face] + levers**2 * self.direction_variances[face])
+
+    def displacements_m(self, faces: NDArray[np.int64], places_m: Array) -> Array:
+        """How one standard deviation of each error moves places along their normals, shape (q, s + groups).
+
+        Args:
+            faces: face of each place, shape (q,); negative where no face is, which nothing moves.
+            places_m: shape (q, 2).
+        """
+        moves = np.zeros((len(places_m), self.faces.count + len(self.direction_variances)))
+        for face in range(self.faces.count):
+            here = np.flatnonzero(faces == face)
+            turning = self.faces.count + self.faces.direction_groups[face]
+            moves[here, face] = np.sqrt(self.offset_variances_m2[face])
+            moves[here, turning] = self._levers_m(face, places_m[here]) * np.sqrt(self.direction_variances[face])
+        return moves
 
     def _levers_m(self, face: int, places_m: Array) -> Array:
         return np.asarray(places_m @ self.faces.tangents[face] - self.middles_m[face])

@@ -22,7 +22,7 @@ from tactile_lab.slam.shape.planar.regularity import with_right_angles
 from tactile_lab.slam.shape.planar.segmentation import PlanarContacts, segment
 from tactile_lab.slam.shape.selection.spatial_choice import best_spatial_shape
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
-from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour, extract_mesh
+from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour, extract_mesh, slope_of
 
 FINGERTIP_RADIUS_m = 0.006
 """Smallest thickness of a fingertip: the point this far outside of each contact is free."""
@@ -52,6 +52,11 @@ class GpisShape:
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
         return extract_contour(self.gpis, resolution_m=resolution_m)
+
+    def covariance_m2(self, places_m: Array) -> Array:
+        """Covariance of displacements along the normals at places on the outline, shapes (q, 2) and (q, q)."""
+        slopes = self.gpis.sigma_inflation / slope_of(self.gpis.gradient(places_m))
+        return np.asarray(self.gpis.joint_covariance(places_m) * slopes[:, None] * slopes)
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
         return extract_mesh(self.gpis, resolution_m=resolution_m, floor_m=floor_m)

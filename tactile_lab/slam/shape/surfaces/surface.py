@@ -26,6 +26,10 @@ _FLAT = 1e-3
 _RIM_STEPS, _LARGEST_RIM_STEP, _FLATTEST_WALL = 4, 1.7, 0.3
 LEVEL_SIGMA_m = 0.0002
 """Standard deviation of the height of a flat end: the table, or a level determined by many contacts."""
+RESOLUTION_m = 0.001
+"""Of a fingertip. Where a surface is fitted to another, standard deviations far below it count alike, so that no part
+is fitted for its own sake, and guesses count little.
+"""
 _FLATTEST_SLOPE = 1e-3
 """Below this slope the field does not determine its surface; sigma is then computed with this slope."""
 
@@ -211,17 +215,18 @@ def _refine(field: SurfaceField, points_m: Array, reach_m: float) -> tuple[Array
     """
     for _ in range(_NEWTON_STEPS):
         found = field.predict(points_m, gradient=True)
-        slope = _slope(found.gradient)
+        slope = slope_of(found.gradient)
         steps = (found.mean_m / slope**2)[:, None] * found.gradient
         is_near = np.linalg.norm(steps, axis=1) < reach_m
         points_m = points_m - np.where(is_near[:, None], steps, 0.0)
     found = field.predict(points_m, gradient=True, variance=True)
-    slope = _slope(found.gradient)
+    slope = slope_of(found.gradient)
     sigma = field.sigma_inflation * np.sqrt(found.variance_m2) / slope
     return points_m, found.gradient / slope[:, None], sigma
 
 
-def _slope(gradient: Array) -> Array:
+def slope_of(gradient: Array) -> Array:
+    """Slope of a field from its gradient, shapes (q, d) and (q,), at least what determines a surface."""
     return np.asarray(np.maximum(np.linalg.norm(gradient, axis=1), _FLATTEST_SLOPE))
 
 

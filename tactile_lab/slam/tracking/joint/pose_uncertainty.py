@@ -6,8 +6,9 @@ contacts move along their normals the surface follows them; along the surface th
 known depends on the shape: the field only binds neighbouring contacts to each other, an outline times a range of
 heights those above each other too, and flat faces contacts all over the object.
 
-A motion of all contacts as one body changes the place of the shape and not the shape, so that part is removed: the
-result is the uncertainty of the surface after the best rigid alignment.
+A motion of all contacts as one body changes the place of the shape and not the shape, so that part is removed, from
+the model's own part of an outline's variance too: the result is the uncertainty after the best rigid alignment
+(decision 97).
 
 Errors that all contacts of one finger share (:mod:`shared_errors`) are propagated in the same way, through the poses
 and the faces that adapt to them. A contact's variance, which weighs it, contains them too: what they add to the surface
@@ -16,7 +17,7 @@ as if drawn anew for each contact is taken away, so that they count once (decisi
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -25,9 +26,10 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.planar.polygon import Polygon
+from tactile_lab.slam.shape.selection.planar_choice import GpisShape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, on_walls
-from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+from tactile_lab.slam.shape.surfaces.surface import Contour, RESOLUTION_m, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -57,10 +59,12 @@ def propagate_pose_uncertainty(
     used = _walls(contact_map) if isinstance(shape, Prism) else contact_map
     axes = slice(0, used.dimension)
     changes = _changes(used, noise, places_m[:, axes], normals[:, axes], faceted=_has_flat_faces(shape))
-    on_table = contact_map.space is PLANAR
-    parts = (_variance(_reshape(each, places_m, normals, on_table=on_table)) for each in changes)
-    by_poses, by_fingers, as_if_anew = parts
-    anew = extracted.sigma_m**2 + by_poses
+    fit = _BestFit.of(places_m, normals, extracted.sigma_m, on_table=contact_map.space is PLANAR)
+    by_poses, by_fingers, as_if_anew = (_variance(fit.leaves(each)) for each in changes)
+    own = extracted.sigma_m**2
+    if isinstance(extracted, Contour) and isinstance(shape, Polygon | GpisShape):
+        own = np.maximum(own - fit.takes(shape.covariance_m2(places_m)), 0.0)
+    anew = own + by_poses
     least = _least_own_share(used.contacts_world) * anew
     return replace(
         extracted,
@@ -121,15 +125,39 @@ def _shared_changes(
     return np.tile(alike[0], (len(places_m), 1)), np.tile(alike[1], (len(places_m), 1))
 
 
-def _reshape(change: Array, places_m: Array, normals: Array, *, on_table: bool) -> Array:
-    """Displacements along the normals, shape (q, m), after the best rigid motion of the surface is removed."""
-    arms = places_m - places_m.mean(axis=0)
-    if places_m.shape[1] == 2:
-        rigid = np.column_stack([normals, arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]])
-    else:
-        turning = np.cross(arms, normals)
-        rigid = np.column_stack([normals[:, :2], turning[:, 2]] if on_table else [normals, turning])
-    return np.asarray(change - rigid @ np.linalg.lstsq(rigid, change, rcond=None)[0])
+@dataclass(frozen=True)
+class _BestFit:
+    """What the best rigid fit of a surface to the true one makes of the surface's displacements along its normals.
+
+    Attributes:
+        by_motions: displacement of each place by each motion, shape (q, k).
+        motions: that are fitted to displacements, shape (k, q).
+    """
+
+    by_motions: Array
+    motions: Array
+
+    @classmethod
+    def of(cls, places_m: Array, normals: Array, sigma_m: Array, *, on_table: bool) -> _BestFit:
+        """Of a surface with standard deviations, shape (q,), by which its places count."""
+        arms = places_m - places_m.mean(axis=0)
+        if places_m.shape[1] == 2:
+            rigid = np.column_stack([normals, arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]])
+        else:
+            turning = np.cross(arms, normals)
+            rigid = np.column_stack([normals[:, :2], turning[:, 2]] if on_table else [normals, turning])
+        weights = 1 / np.hypot(sigma_m, RESOLUTION_m)
+        return cls(rigid, np.linalg.pinv(rigid * weights[:, None]) * weights)
+
+    def leaves(self, change: Array) -> Array:
+        """Displacements, shape (q, m), without the best motion."""
+        return np.asarray(change - self.by_motions @ (self.motions @ change))
+
+    def takes(self, covariance_m2: Array) -> Array:
+        """By how much it reduces the variance of displacements with this covariance, shapes (q,) and (q, q)."""
+        with_motions = covariance_m2 @ self.motions.T
+        of_motions = self.by_motions @ (self.motions @ with_motions)
+        return np.asarray(np.sum(self.by_motions * (2 * with_motions - of_motions), axis=1))
 
 
 def _has_flat_faces(shape: FittedShape) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from gtsam import Pose2, Pose3
+from gtsam import Pose2, Pose3, Rot3
 
 from tactile_lab.evaluation.consistency.levels import CURVE, LEVELS
 from tactile_lab.evaluation.consistency.surfaces import mesh_consistency, outline_consistency, surface_consistency
@@ -28,11 +28,36 @@ def test_normal_errors_give_the_diagonal_as_calibration_curve() -> None:
 
 def test_a_standard_deviation_between_two_points_is_interpolated() -> None:
     square = 0.05 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    bigger, sigma_m = 1.02 * square, np.array([0.0001, 0.0001, 0.01, 0.01])
+    bigger, sigma_m = 1.02 * square, np.array([0.0001, 0.001, 0.0001, 0.001])
     found = outline_consistency(bigger, sigma_m, square, Pose2())
     assert found.signed_mm == pytest.approx(1.0, abs=0.02)
     assert 0.25 < found.inside[2] < 0.8
     assert mesh_consistency(BOX, np.full(8, 0.001), BOX, Pose3()).inside == (1.0, 1.0, 1.0)
+
+
+def test_a_guess_does_not_displace_what_is_known() -> None:
+    square = 0.05 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 0.8], [1.0, 1.0], [0.8, 1.0], [-1.0, 1.0]])
+    guessed, sigma_m = square.copy(), np.full(6, 0.0002)
+    guessed[3] *= 1.3
+    sure = outline_consistency(guessed, sigma_m, square, Pose2())
+    sigma_m[3] = 0.02
+    told = outline_consistency(guessed, sigma_m, square, Pose2())
+    assert told.inside[2] > 0.95 > 0.7 > sure.inside[2]
+
+
+def test_a_shape_is_judged_wherever_it_was_put() -> None:
+    moved = outline_consistency(
+        0.05 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 0.6], [-1.0, 0.6]]) + [0.003, 0.002],
+        np.full(4, 0.0005),
+        0.05 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 0.6], [-1.0, 0.6]]),
+        Pose2(0.0, 0.0, 0.02),
+    )
+    assert moved.inside == (1.0, 1.0, 1.0)
+    assert moved.log_score > 6.6
+    held = mesh_consistency(
+        BOX, np.full(8, 0.0005), BOX, Pose3(Rot3.Ypr(0.01, 0.02, -0.01), [0.001, 0, 0]), upright=False
+    )
+    assert held.inside == (1.0, 1.0, 1.0)
 
 
 def test_a_long_side_counts_more_than_many_points_on_a_short_one() -> None:
@@ -45,7 +70,7 @@ def test_a_long_side_counts_more_than_many_points_on_a_short_one() -> None:
 
 def test_a_shape_inside_the_truth_has_a_negative_mean_error() -> None:
     inner, outer = trimesh.creation.box((0.098, 0.058, 0.038)), BOX
-    sigma_m = np.full(len(inner.vertices), 0.0005)
+    sigma_m = np.full(len(inner.vertices), 0.0004)
     found = mesh_consistency(inner, sigma_m, outer, Pose3())
     assert found.signed_mm == pytest.approx(-1.0, abs=0.05)
     assert found.inside == pytest.approx((0.0, 0.0, 0.0), abs=0.05)

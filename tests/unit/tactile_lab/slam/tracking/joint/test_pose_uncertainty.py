@@ -12,6 +12,7 @@ from drivers.core.contacts import Array
 from tactile_lab.experiments.data import spatial_data
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
+from tactile_lab.slam.shape.planar.polygon import Polygon
 from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape
 from tactile_lab.slam.shape.solids.planes import fit_planes, weighted_contacts
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
@@ -27,7 +28,7 @@ from tactile_lab.slam.tracking.faces.flat_faces import tangents
 from tactile_lab.slam.tracking.joint.pose_uncertainty import propagate_pose_uncertainty
 from tests.support.simulated_contacts import true_map
 
-NOISE = MotionNoise()
+NOISE, HELD = MotionNoise(), MotionNoise(translation_m=1e-6, rotation_rad=1e-5)
 TABLE_m, COARSE_m = 0.0, 0.006
 MODELS: dict[str, Callable[[ContactMap], Polyhedron | Prism | StandingField]] = {
     "box-12x6x6": lambda known: Polyhedron.fit(known.fit()),
@@ -60,21 +61,22 @@ def test_poses_add_to_the_sigma_of_a_surface_and_change_nothing_else(shape: str)
 
 
 def test_poses_are_in_doubt_from_the_second_grasp_on() -> None:
-    def sigma_m(count: int) -> tuple[Array, Array]:
+    def sigma_m(count: int) -> tuple[Array, Array, Array]:
         known = true_map("rectangle", count=count)
         model = GpisShape(known.fit())
         outline = model.contour(0.004)
-        return outline.sigma_m, propagate_pose_uncertainty(outline, model, known, NOISE).sigma_m
+        held, slipped = (propagate_pose_uncertainty(outline, model, known, noise).sigma_m for noise in (HELD, NOISE))
+        return outline.sigma_m, held, slipped
 
-    alone_m, told_alone_m = sigma_m(1)
-    assert told_alone_m.tolist() == alone_m.tolist(), "the first pose defines the object's frame"
-    given_m, told_m = sigma_m(2)
-    assert np.sqrt(np.median(told_m**2 - given_m**2)) > 1e-4
+    alone_m, *told_alone_m = sigma_m(1)
+    assert all(told_m.tolist() == alone_m.tolist() for told_m in told_alone_m), "the first pose defines the frame"
+    _, held_m, slipped_m = sigma_m(2)
+    assert np.sqrt(np.median(slipped_m**2 - held_m**2)) > 1e-4
 
 
 @pytest.mark.parametrize("shape", MODELS)
 def test_where_the_object_hardly_slips_poses_add_hardly_anything(shape: str) -> None:
-    given, doubtful = doubted(shape, MotionNoise(translation_m=1e-6, rotation_rad=1e-5))
+    given, doubtful = doubted(shape, HELD)
     assert np.allclose(doubtful.sigma_m, given.sigma_m, atol=2e-5)
 
 
@@ -111,6 +113,26 @@ def test_the_field_follows_the_poses_as_foretold() -> None:
     foretold_m = change @ step
     assert np.corrcoef(found_m, foretold_m)[0, 1] > 0.9
     assert np.std(foretold_m) == pytest.approx(np.std(found_m), rel=0.3)
+
+
+@pytest.mark.parametrize("shape", ["rectangle", "ellipse"])
+def test_the_best_fit_takes_a_part_of_an_outlines_own_variance(shape: str) -> None:
+    known = true_map(shape)
+    model = best_shape(known.fit())
+    assert isinstance(model, Polygon if shape == "rectangle" else GpisShape)
+    outline = model.contour(0.002)
+    told = propagate_pose_uncertainty(outline, model, known, HELD)
+    covariance_m2 = model.covariance_m2(outline.points_m)
+    assert np.all(np.diag(covariance_m2) <= outline.sigma_m**2 * 1.001)
+    draws = np.linalg.cholesky(covariance_m2 + 1e-14 * np.eye(len(covariance_m2)))
+    draws = draws @ np.random.default_rng(0).normal(size=(len(draws), 2000))
+    arms, normals = outline.points_m - outline.points_m.mean(axis=0), outline.normals
+    turning = arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]
+    motions = np.column_stack([normals, turning])
+    left = draws - motions @ np.linalg.lstsq(motions, draws, rcond=None)[0]
+    hidden_m2 = outline.sigma_m**2 - np.diag(covariance_m2)
+    assert told.sigma_m == pytest.approx(np.sqrt(left.var(axis=1) + hidden_m2), rel=0.15)
+    assert told.sigma_m.mean() < 0.9 * outline.sigma_m.mean()
 
 
 def test_faces_at_right_angles_stay_so_whatever_the_poses_do() -> None:
