@@ -55,8 +55,10 @@ _STRAY_SHARE = 0.18
 hundred sessions.
 """
 
-_GRAVE_FIRST = 2
-"""So many wrong contacts of the first grasp make the object frame itself doubtful; a single one is only told."""
+_GRAVE_FIRST = 3
+"""So many wrong contacts of the first grasp make the object frame itself doubtful; fewer are only told: the rest of the
+session places it as well as any other grasp.
+"""
 
 
 def signs(contact_map: ContactMap, noise: MotionNoise, *, poses_given: bool = False) -> tuple[Doubt, ...]:

@@ -6,8 +6,11 @@ and the evidence decides whether it is kept.
 
 from __future__ import annotations
 
+from functools import partial
+
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
+from tactile_lab.slam.tracking.faces.missing_face import with_missing_face
 from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
 from tactile_lab.slam.tracking.joint.deferred_association import Relocate, associate_deferred, readmit_contacts
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest
@@ -100,7 +103,8 @@ class SecondOpinions:
         placed = self._retry_unplaced(hypothesis, sharp)
         found = self._mechanisms.improve("placing on the object", placed, relocalizer.improve)
         self.rivals = relocalizer.rivals
-        return found
+        onto_missing = partial(with_missing_face, sharp=sharp, noise=self._noise)
+        return self._mechanisms.improve("placing on the object", found, onto_missing)
 
     def _retry_unplaced(self, best: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
         """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""
