@@ -26,7 +26,7 @@ Interfere = Callable[[Plant, int], None]
 
 
 def carry_with(
-    interfere: Interfere, monkeypatch: pytest.MonkeyPatch, shape: str = "box-10x6x4"
+    interfere: Interfere, monkeypatch: pytest.MonkeyPatch, shape: str = "box-10x6x4", seed: int = SEED
 ) -> tuple[SessionOutcome, CarryWatch]:
     """A session of two grasps; something happens in each cycle of the carry between them."""
 
@@ -45,7 +45,7 @@ def carry_with(
                 interfere(self._world.plant, self.cycles)
 
     monkeypatch.setattr(carried_objects, "CarryWatch", Interfering)
-    return watch_carries(shape, SEED, grasps=2)
+    return watch_carries(shape, seed, grasps=2)
 
 
 def only_carry(outcome: SessionOutcome, watch: CarryWatch) -> tuple[WatchedCarry, Carry]:
@@ -84,6 +84,16 @@ def fix_to_the_table(plant: Plant, cycle: int) -> None:
         plant._model.dof_damping[first : first + 6] = 1e4
 
 
+def jam(plant: Plant, cycle: int) -> None:
+    """Something presses it onto the table."""
+    plant._data.xfrc_applied[plant._object, 2] = -60.0 * min(max((cycle - 2 * LATER) / 10, 0.0), 1.0)
+
+
+def leave_to_the_first_finger(plant: Plant, cycle: int) -> None:
+    if cycle == 2 * LATER:
+        lift_off(plant, set(FINGERS) - {"FF"})
+
+
 def tip_over(plant: Plant, cycle: int) -> None:
     if cycle >= SOON:
         side = plant._data.xmat[plant._object].reshape(3, 3)[:, 1]
@@ -91,18 +101,20 @@ def tip_over(plant: Plant, cycle: int) -> None:
 
 
 @pytest.mark.parametrize(
-    ("interfere", "shape", "words"),
+    ("interfere", "shape", "seed", "words"),
     [
-        (lose, "box-10x6x4", "touched by no fingertip for"),
-        (leave_to_the_thumb, "box-10x6x4", "held by one fingertip for"),
-        (fix_to_the_table, "box-10x6x4", "is it jammed, or held by something?"),
-        (tip_over, "cube-6", "has it fallen over?"),
+        (lose, "box-10x6x4", SEED, "touched by no fingertip for"),
+        (leave_to_the_thumb, "box-10x6x4", SEED, "held by one fingertip for"),
+        (leave_to_the_first_finger, "l-block", 9, "held by one fingertip for"),
+        (fix_to_the_table, "box-10x6x4", SEED, "is it jammed, or held by something?"),
+        (jam, "hexagonal-prism", 8, "is it jammed, or held by something?"),
+        (tip_over, "cube-6", SEED, "has it fallen over?"),
     ],
 )
 def test_what_happens_to_the_object_is_told_and_the_noise_holds_it(
-    monkeypatch: pytest.MonkeyPatch, interfere: Interfere, shape: str, words: str
+    monkeypatch: pytest.MonkeyPatch, interfere: Interfere, shape: str, seed: int, words: str
 ) -> None:
-    outcome, watch = carry_with(interfere, monkeypatch, shape)
+    outcome, watch = carry_with(interfere, monkeypatch, shape, seed)
     found, felt = only_carry(outcome, watch)
     assert any(words in told for told in watch.told)
     assert np.abs(sigmas_off(found, felt)).max() < 3.0

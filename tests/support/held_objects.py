@@ -37,8 +37,8 @@ def steps_of(contacts, count):
     void = np.zeros(shape, dtype=bool)
     times = np.full(count, STEP_s)
     still, forces, sinking = np.zeros((*shape, 3)), np.ones(shape), np.zeros(shape)
-    net = np.zeros((count, 3))
-    return TipSteps(points, normals, still, forces, sinking, np.zeros(shape), net, void, frames, times)
+    net, moments, levers = np.zeros((count, 3)), np.zeros(count), np.zeros(count)
+    return TipSteps(points, normals, still, forces, sinking, np.zeros(shape), net, moments, levers, void, frames, times)
 
 
 def carried(contacts, *, object_motion, palm_motion, felt=FINGERS, extra_moves=None, count=_STEPS):

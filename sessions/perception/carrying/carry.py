@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from gtsam import Pose2
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip
@@ -24,9 +26,15 @@ _ITERATIONS, _ITERATIONS_OF_OTHERS = 12, 4
 _LEAST_HALF_WIDTH_m, _LARGEST_HALF_WIDTH_m = 0.017, 0.083
 _FAR_m, _FAR_rad = 0.004, float(np.deg2rad(5.0))
 """A slip that a person should hear of: more than half of the rigs' usual ones."""
-_RESISTED_SHARES = (0.2, 0.6)
-"""Net force over the sum of normal forces: usual on a table, and where all fingertips slide the same way."""
-_RESISTS = 0.25
+_RESISTED_SHARES, _RESISTED_TURNS = (0.08, 0.2), (0.3, 0.7)
+"""Net force, and net moment over the mean lever, beyond the table's friction, over the sum of normal forces: of 199
+carries over a table 0 and 0.3 at most, of jammed objects 0.1 to 0.3 or 0.6 to 0.9.
+"""
+_RESISTS, _RESISTS_AROUND = 0.25, 11
+"""Beyond this nothing is believed, nor in as many steps around it, in which the force builds up and fades."""
+_LEAST_LEVER_m = 0.01
+_CLOSES_m_s = 0.008
+"""Fingers that feel nothing go on closing this fast, and may push the object with a link."""
 _USUAL_NET_N, _PUSHED_SHARE = 0.8, 0.9
 """Net force with which objects are dragged over a table, and which quantile of a carry's is compared with it."""
 _SLIDES_m_s, _SLIDES_N = 0.010, 0.2
@@ -161,7 +169,7 @@ class CarryOdometry:
             slip_rad=float(abs(slip[2])),
             loose_s=loose_s,
             single_s=single_s,
-            resisted_N=_resisted_N(steps),
+            resisted_N=_resisted_N(steps, usual),
             tilted_rad=tilted_rad,
             void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
             sliding=_sliding_ratios(steps, balance.sliding_m(best)),
@@ -169,9 +177,10 @@ class CarryOdometry:
 
     def _unseen(self, steps: TipSteps, centres_m: Array, tilted_rad: float) -> Array:
         """Motion that was not seen, metres and radians: of the hand in doubtful steps, and of what tips over."""
-        return _unseen(steps, centres_m, self._fingertips) + tilted_rad * np.array(
-            [2 * self.friction.half_width_m, 1.0]
-        )
+        unseen_m, unseen_rad = _unseen(steps, centres_m, self._fingertips, self.friction)
+        half_m, closing_m = self.friction.half_width_m, _CLOSES_m_s * float(steps.step_s @ (steps.felt.sum(axis=1) < 2))
+        turned_rad = unseen_rad + closing_m / half_m + tilted_rad
+        return np.array([unseen_m + closing_m + 2 * half_m * tilted_rad, turned_rad])
 
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
         noise, held = self.noise, Roundness.of(steps, balance)
@@ -193,8 +202,13 @@ class CarryOdometry:
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],
         ]
-        scaled = self._scale * np.linalg.norm(parts_m), self._scale * np.linalg.norm(parts_rad)
-        return StepSigma(float(scaled[0]), float(scaled[1]))
+        rotation_rad = float(np.linalg.norm(parts_rad))
+        translation_m = float(np.linalg.norm([*parts_m, self._off_centre_m(steps) * rotation_rad]))
+        return StepSigma(self._scale * translation_m, self._scale * rotation_rad)
+
+    def _off_centre_m(self, steps: TipSteps) -> float:
+        """How far the object's middle is from that of its contacts, about which it turns: far for few contacts."""
+        return self.friction.half_width_m / max(float(steps.felt.sum(axis=1).mean()), 1.0)
 
 
 def _other_assumptions(usual: Friction, measured: MeasuredFriction) -> Sequence[Friction]:
@@ -217,11 +231,27 @@ def _sliding_ratios(steps: TipSteps, sliding_m: Array) -> Array:
     return np.asarray(steps.tangential_N[slides] / steps.forces_N[slides])
 
 
-def _resistance(steps: TipSteps) -> Array:
-    """How little the fingertips can be believed to stick in each step, 0 to 1, shape (n,): by their net force."""
-    share = np.linalg.norm(steps.net_forces_N[:, :2], axis=1) / np.maximum(steps.forces_N.sum(axis=1), 1e-9)
-    low, high = _RESISTED_SHARES
-    return np.asarray(np.clip((share - low) / (high - low), 0.0, 1.0) ** 2)
+def _resistance(steps: TipSteps, table: Friction) -> Array:
+    """How little the fingertips can be believed to stick in each step, 0 to 1, shape (n,): by the force and the moment
+    with which they push the object, beyond what the table's friction explains, over how hard they press.
+    """
+    pushes_N = np.column_stack([np.linalg.norm(steps.net_forces_N[:, :2], axis=1), _turning_N(steps)])
+    usual_N = np.column_stack([np.ones(len(steps)), table.foot_m / np.maximum(steps.levers_m, _LEAST_LEVER_m)])
+    beyond_N = np.maximum(pushes_N - max(table.table_N, Friction.table_N) * usual_N, 0.0)
+    low, high = np.array([_RESISTED_SHARES, _RESISTED_TURNS]).T
+    shares = beyond_N / np.maximum(steps.forces_N.sum(axis=1), 1e-9)[:, None]
+    return np.asarray((np.clip((shares - low) / (high - low), 0.0, 1.0) ** 2).max(axis=1))
+
+
+def _resists(steps: TipSteps, table: Friction) -> NDArray[np.bool_]:
+    """Steps in which it resists at least two fingertips, shape (n,); none where that is too short to tell."""
+    flags = (_resistance(steps, table) > _RESISTS) & (steps.felt.sum(axis=1) > 1)
+    return np.asarray(flags & bool(steps.step_s @ flags >= _NO_HOLD_s))
+
+
+def _turning_N(steps: TipSteps) -> Array:
+    """The moment with which the fingertips turn the object, as a force at their mean lever, shape (n,)."""
+    return np.asarray(np.abs(steps.moments_Nm) / np.maximum(steps.levers_m, _LEAST_LEVER_m))
 
 
 def _pushed_N(steps: TipSteps) -> float:
@@ -230,19 +260,20 @@ def _pushed_N(steps: TipSteps) -> float:
     return float(max(np.quantile(net_N, _PUSHED_SHARE) - _USUAL_NET_N, 0.0))
 
 
-def _resisted_N(steps: TipSteps) -> float:
-    """Mean net force while the object resisted; 0 if it hardly did."""
-    resists = _resistance(steps) > _RESISTS
-    if steps.step_s @ resists < _NO_HOLD_s:
+def _resisted_N(steps: TipSteps, table: Friction) -> float:
+    """Mean force with which the fingertips pushed or turned the object while it resisted; 0 if it hardly did."""
+    resists = _resists(steps, table)
+    if not resists.any():
         return 0.0
-    return float(np.linalg.norm(steps.net_forces_N[resists, :2], axis=1).mean())
+    pushes_N = np.maximum(np.linalg.norm(steps.net_forces_N[:, :2], axis=1), _turning_N(steps))
+    return float(pushes_N[resists].mean())
 
 
-def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip]) -> Array:
+def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip], table: Friction) -> Array:
     """The hand's motion, metres and radians, in steps that too few fingertips measure; shape (2,)."""
     wired = [finger in fingertips for finger in FINGERS]
     poorly = (steps.felt.sum(axis=1) < 2) | (steps.is_void & wired).any(axis=1)
-    doubt = np.maximum(poorly, _resistance(steps))
+    doubt = np.maximum(poorly | maximum_filter1d(_resists(steps, table), _RESISTS_AROUND), _resistance(steps, table))
     if not doubt.any():
         return np.zeros(2)
     moves = planar_matrices(steps.world_T_palm)

@@ -126,6 +126,8 @@ class IntendedCarry:
             sinking=still,
             tangential_N=still,
             net_forces_N=np.zeros((count, 3)),
+            moments_Nm=np.zeros(count),
+            levers_m=np.zeros(count),
             is_void=np.zeros(shape, dtype=bool),
             world_T_palm=frames,
             step_s=np.full(count, self.duration_s / count),

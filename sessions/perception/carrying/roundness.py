@@ -21,6 +21,8 @@ _LEAST_SHARE = 0.3
 _MOST_LEAN = 0.15
 _HELD_BY = 2
 """So many fingertips hold an object; each further one holds its turn too."""
+_LEAST_SPARE = 0.4
+"""Friction at the edges of two contacts holds a turn a little, too."""
 _RCOND = 1e-3
 
 
@@ -30,7 +32,7 @@ class Roundness:
 
     Attributes:
         loose: 1 for an object whose turn no normal shows, towards 0 for one with corners.
-        spare: fingertips beyond the two that any object needs, at least 0.5.
+        spare: fingertips beyond the two that any object needs, at least 0.4.
         lean: sine of the angle by which its sides lean, at most 0.15.
     """
 
@@ -42,7 +44,7 @@ class Roundness:
     def of(cls, steps: TipSteps, balance: Balance) -> Roundness:
         """Of a carry; one in which two fingertips never held the object at once is not called round."""
         held = steps.felt.sum(axis=1) >= _HELD_BY
-        spare = max(float(steps.felt.sum(axis=1).mean()) - _HELD_BY, 0.5)
+        spare = max(float(steps.felt.sum(axis=1).mean()) - _HELD_BY, _LEAST_SPARE)
         if not held.any():
             return cls(0.0, spare, 0.0)
         lever_m = float(np.median(_levers_m(balance.entering[held], balance.forces_N[held])))

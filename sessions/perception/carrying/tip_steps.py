@@ -41,6 +41,8 @@ class TipSteps:
         sinking: how much deeper each fingertip sinks in, in units of its give (:func:`_sinking`), shape (n, 5).
         tangential_N: forces along the surface, shape (n, 5); zero likewise.
         net_forces_N: force of all fingertips on the object, shape (n, 3).
+        moments_Nm: their vertical moment about the middle of the contacts, shape (n,).
+        levers_m: mean distance of the contacts from there, weighted with their normal forces, shape (n,).
         is_void: fingertips without a valid reading, shape (n, 5).
         world_T_palm: at the beginning of each step and at the end of the last, shape (n + 1, 4, 4).
         step_s: length of a step, shape (n,).
@@ -53,6 +55,8 @@ class TipSteps:
     sinking: Array
     tangential_N: Array
     net_forces_N: Array
+    moments_Nm: Array
+    levers_m: Array
     is_void: NDArray[np.bool_]
     world_T_palm: Array
     step_s: Array
@@ -78,6 +82,8 @@ def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingerti
     normals = _middle_normals(before, after, felt.normals_distal)
     steep = normals[..., 0] ** 2 + normals[..., 1] ** 2 > LARGEST_SLOPE**2
     forces_N = np.where(felt.is_certain & steep, np.maximum(felt.normal_forces_N, 0.0), 0.0)
+    pushes_N = -(before[..., :3, :3] @ felt.forces_distal_N[..., None])[..., 0]
+    moments_Nm, levers_m = _moments(starts, pushes_N, forces_N)
     along_N = np.sum(felt.forces_distal_N**2, axis=-1) - felt.normal_forces_N**2
     return TipSteps(
         points_m=(starts + ends) / 2,
@@ -86,7 +92,9 @@ def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingerti
         forces_N=forces_N,
         sinking=_sinking(forces_N),
         tangential_N=np.where(forces_N > 0.0, np.sqrt(np.maximum(along_N, 0.0)), 0.0),
-        net_forces_N=-np.einsum("nfij,nfj->ni", before[..., :3, :3], felt.forces_distal_N),
+        net_forces_N=pushes_N.sum(axis=1),
+        moments_Nm=moments_Nm,
+        levers_m=levers_m,
         is_void=felt.is_void,
         world_T_palm=world_T_palm,
         step_s=np.diff(samples.stamps_ns[chosen]) / NANOSECONDS,
@@ -105,6 +113,16 @@ def _felt(readings: Array, world_R_distal: Array, fingertips: Mapping[str, Conti
         for name in TipTouches.__dataclass_fields__:
             getattr(felt, name)[:, at] = getattr(touches, name)
     return felt
+
+
+def _moments(points_m: Array, pushes_N: Array, forces_N: Array) -> tuple[Array, Array]:
+    """Vertical moment of pushes at contacts about their middle, shape (n,), and their mean lever, shape (n,)."""
+    felt = forces_N > 0.0
+    middles_m = np.einsum("nf,nfi->ni", felt, points_m) / np.maximum(felt.sum(axis=1), 1)[:, None]
+    arms_m = (points_m - middles_m[:, None]) * felt[..., None]
+    moments_Nm = (arms_m[..., 0] * pushes_N[..., 1] - arms_m[..., 1] * pushes_N[..., 0]).sum(axis=1)
+    levers_Nm = np.einsum("nf,nf->n", forces_N, np.hypot(arms_m[..., 0], arms_m[..., 1]))
+    return moments_Nm, levers_Nm / np.maximum(forces_N.sum(axis=1), 1e-9)
 
 
 def _sinking(forces_N: Array) -> Array:

@@ -10,6 +10,7 @@ from sessions.perception.carrying.friction_balance import Balance, Friction, com
 from tests.support.held_objects import BOX, DISC, carried, steps_of
 
 TURN = Pose2(0.02, -0.01, 0.4)
+_HOLDS = (("FF", "TH"), FINGERS)
 
 
 def odometry():
@@ -106,6 +107,49 @@ def test_an_object_that_cannot_be_moved_resists_and_the_noise_holds_that():
     assert "resisted" in carry.in_words()
     assert carry.is_remarkable
     assert carry.sigma.translation_m > error(carry, Pose2())[0] / 1e3 / 3
+
+
+def test_an_object_that_cannot_be_turned_resists_and_the_noise_holds_that():
+    """All fingertips slide around it: their forces balance, only their moment tells."""
+    turn = Pose2(0.0, 0.0, 0.4)
+    steps = carried(DISC, object_motion=turn, palm_motion=turn)
+    steps.levers_m[:], steps.moments_Nm[:] = 0.03, 0.9 * 0.03 * steps.forces_N.sum(axis=1)
+    carry = odometry().carry(steps)
+    assert carry.resisted_N == pytest.approx(0.9 * 5.0)
+    assert carry.sigma.rotation_rad > error(carry, Pose2())[1] / np.degrees(3)
+
+
+@pytest.mark.parametrize("felt", [("FF", "TH"), FINGERS])
+def test_the_tables_friction_is_no_jam_however_few_fingertips_drag_the_object(felt):
+    steps = carried(BOX, object_motion=TURN, palm_motion=TURN, felt=felt)
+    steps.net_forces_N[:] = [0.9, 0.0, 0.0]
+    carry = odometry().carry(steps)
+    assert carry.resisted_N == 0.0
+    assert carry.problems == ()
+
+
+def test_a_jam_is_told_of_few_steps_and_what_is_around_them_is_not_believed():
+    steps = carried(BOX, object_motion=TURN, palm_motion=TURN)
+    sure = odometry().carry(steps).sigma
+    steps.net_forces_N[50:53] = [3.0, 0.0, 0.0]
+    jammed = odometry().carry(steps)
+    assert jammed.resisted_N == pytest.approx(3.0)
+    assert jammed.sigma.rotation_rad > sure.rotation_rad + 0.04 * TURN.theta()
+
+
+def test_an_object_may_be_off_its_contacts_by_more_the_fewer_hold_it():
+    """Its turn is about their middle: what is not known of it moves the object's own middle."""
+    sigmas = [odometry().carry(carried(DISC, object_motion=TURN, palm_motion=TURN, felt=felt)).sigma for felt in _HOLDS]
+    extra_m = [0.04 * sigma.rotation_rad / len(felt) for sigma, felt in zip(sigmas, _HOLDS, strict=True)]
+    assert all(sigma.translation_m >= extra for sigma, extra in zip(sigmas, extra_m, strict=True))
+    assert extra_m[0] > 2 * extra_m[1]
+
+
+def test_fingers_that_feel_nothing_go_on_closing_and_may_push_the_object():
+    """Though the hand itself hardly moves."""
+    carry = odometry().carry(carried(BOX, object_motion=Pose2(), palm_motion=Pose2(), felt=("TH",)))
+    assert carry.sigma.translation_m > 0.5 * 0.008 * carry.single_s
+    assert carry.sigma.rotation_rad > 0.5 * 0.008 * carry.single_s / 0.04
 
 
 def test_a_fingertip_that_sinks_in_does_not_drag_the_object():

@@ -52,4 +52,4 @@ def test_sides_that_lean_may_roll() -> None:
 def test_an_object_that_nobody_holds_is_not_called_round() -> None:
     steps = turned(DISC)
     lost = replace(steps, forces_N=np.zeros_like(steps.forces_N))
-    assert roundness(lost) == Roundness(0.0, 0.5, 0.0)
+    assert roundness(lost) == Roundness(0.0, 0.4, 0.0)
