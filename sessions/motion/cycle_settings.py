@@ -74,6 +74,7 @@ class CycleSettings(StrictModel):
         standoff_m: how far before a grasp from the side the hand comes down.
         descent_m_s: speed of the guarded descent, as far as the object's top.
         landing_m_s: and next to the object; on a thumb, stiff in that direction, 35 mm/s end with 1.6 N.
+        links_landing_m_s: and where links may land on it, which are stiffer still: 18 mm/s end with 1.9 to 3.3 N.
         beside_m_s: the same where nothing is expected below.
         approach_m_s: speed of the guarded approach from the side.
         landing_force_N: a fingertip force during the descent that means the object is under it.
@@ -114,6 +115,7 @@ class CycleSettings(StrictModel):
     standoff_m: float = Field(default=0.13, gt=0.0)
     descent_m_s: float = Field(default=0.05, gt=0.0)
     landing_m_s: float = Field(default=0.018, gt=0.0)
+    links_landing_m_s: float = Field(default=0.006, gt=0.0)
     beside_m_s: float = Field(default=0.05, gt=0.0)
     approach_m_s: float = Field(default=0.03, gt=0.0)
     landing_force_N: float = Field(default=0.25, gt=0.0)

@@ -9,7 +9,7 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
-from drivers.shadow.closing.hand_envelope import open_hand
+from drivers.shadow.closing.hand_envelope import lowest_inside_m, open_hand
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.carry_guard import CarryGuard
 from sessions.motion.cycle_settings import CycleSettings
@@ -28,6 +28,12 @@ from sessions.perception.carrying.slip import Slip
 
 _LEAST_HOLD_N = 0.1
 """A fingertip that presses less holds nothing."""
+
+_LINKS_NEAR_m = 0.005
+"""Above a top that is known on: from there links may land on it."""
+
+_BELOW_TOP_m = 0.012
+"""So far at least the fingertips' centres stay below it where a grasp is tried again higher."""
 
 
 class GraspCycle:
@@ -105,13 +111,29 @@ class GraspCycle:
             if not hit:
                 self._motion.supervisor.on_approach()
                 return True
+            up_m = self._short_of_m()
             self.lift()
-            if not plan.may_shift or not (fingers := [finger for finger in hit if finger in self._fingers]):
-                return False  # a link above the fingertips: a little aside it would land again
-            landed.update(fingers)
-            shift_m, window = self.settings.landing_shift_m, self._yaw_window_rad
-            self._plan = evade(plan, self.plan, fingers, landed, self._table(), shift_m, window)
+            if (again := self._otherwise(plan, hit, landed, up_m)) is None:
+                return False
+            self._plan = again
         return False
+
+    def _short_of_m(self) -> float:
+        """How far above the grasp the hand is."""
+        down = self._motion.base_joints(self.plan.frame, self._table())
+        return float(np.linalg.norm(down[:3] - self._motion.runtime.perception.hand.base_q[:3]))
+
+    def _otherwise(self, plan: GraspPlan, hit: tuple[str, ...], landed: set[str], up_m: float) -> GraspPlan | None:
+        """The plan after a landing ``up_m`` above the grasp: where only links did, which would land again a little
+        aside, so much higher; otherwise as :func:`evade` says. None where that may not be.
+        """
+        s = self.settings
+        if not (fingers := [finger for finger in hit if finger in self._fingers]):
+            return self.plan.raised(up_m, self._motion.tallest_m - _BELOW_TOP_m)
+        if not plan.may_shift:
+            return None
+        landed.update(fingers)
+        return evade(plan, self.plan, fingers, landed, self._table(), s.landing_shift_m, self._yaw_window_rad)
 
     def _touch(self, plan: GraspPlan) -> bool:
         """Only touch, and rise again."""
@@ -185,22 +207,22 @@ class GraspCycle:
         self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
     def _come_down(self) -> tuple[str, ...]:
-        """Guarded descent, slower from the object's top on.
+        """Guarded descent, slower from the object's top on, and slowest where links may land on it.
 
         Returns:
             What landed on something: fingers, or unidentified links.
         """
         s, guard, motion, table = self.settings, self._landing, self._motion, self._table()
-        to_top_m = motion.tallest_m + s.touch.near_m - open_hand(table.name, table.height_m, self._hand).lowest_m
-        top, down = (motion.base_joints(self.plan.frame, table, above_m) for above_m in (max(0.0, to_top_m), 0.0))
-        guard.restart()
-        if motion.probe_base(top, s.descent_m_s, guard.is_met):
+        hand = table.name, table.height_m, self._hand
+        tips_m = max(0.0, motion.tallest_m + s.touch.near_m - open_hand(*hand).lowest_m)
+        links_m = np.clip(motion.tallest_m + _LINKS_NEAR_m - lowest_inside_m(*hand), 0.0, tips_m)
+        for above_m, speed_m_s in ((tips_m, s.descent_m_s), (links_m, s.landing_m_s), (0.0, s.links_landing_m_s)):
             guard.restart()
-            if motion.probe_base(down, s.landing_m_s, guard.is_met):
+            if not motion.probe_base(motion.base_joints(self.plan.frame, table, above_m), speed_m_s, guard.is_met):
                 motion.wait(s.rest_s)
                 guard.is_met()
-        if guard.met:
-            self._note_landing(guard)
+                self._note_landing(guard)
+                break
         return guard.met
 
     # --- close and measure -------------------------------------------------------------------------------------

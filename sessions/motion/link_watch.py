@@ -1,14 +1,18 @@
-"""Whether a link without a sensor has hit something: the motors of its finger or of the wrist show it, late.
+"""Whether a link without a sensor has hit something: the motors of its finger or of the wrist show it.
 
 While the hand moves evenly through free space each motor's strain gauge shows the same but for noise. What pushes on a
-knuckle or on the palm changes that: first the wrist's motor, then the finger's. On the simulated rig it shows 2 to
-4 N of a push from the side at 20 to 50 mm/s; on real tendons expect several times as much. So this is the last guard:
-plans keep links away from what is known.
+knuckle or on the palm changes that: first the wrist's motor, then the finger's. A lone reading says little, as every
+jerk of the positioner is one too: on the simulated rig 2 to 4 N of a push from the side at 20 to 50 mm/s show. Several
+in a row tell less, where joints stand still: 0.7 to 1.5 N of a link that comes down on something. On real tendons
+expect several times as much. So this is the last guard: plans keep links away from what is known.
 """
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 
@@ -20,56 +24,73 @@ _READINGS = 2
 """In a row: a lone one is no touch. A positioner that gets a target late jerks, and the wrist with it. A motor is read
 more rarely than the hand answers: a value that comes again is the same reading."""
 
+_STILL = (3.0, 18.0, 3)
+_STILL_WRIST = (4.0, 60.0, 5)
+"""The same for the motor of a joint that stands still, of the fingers and of the wrist."""
+
+_COMPARED, _LEAST_COMPARED = 200, 5
+"""Newest readings that tell what is usual, and the fewest."""
+
+_MAD_TO_SIGMA = 1.48
+
 
 class LinkWatch:
-    """Compares the motors' strain gauges with what they showed since the motion began."""
+    """Compares the motors' strain gauges with what they showed since the motion began.
 
-    def __init__(self) -> None:
+    What is usual are the median and the median deviation of the newest readings: a push that grows slowly, or a jerk,
+    hardly changes them.
+
+    Args:
+        is_wrist: which motors move the wrist, shape (20,).
+    """
+
+    def __init__(self, is_wrist: NDArray[np.bool_]) -> None:
+        self._sigmas, self._counts, self._in_a_row = np.where(is_wrist, *np.array([_STILL_WRIST, _STILL])[..., None])
         self.restart()
 
     def restart(self) -> None:
         """A new even motion begins."""
-        self._learned, self._suspicious = 0, 0
         self._began_ns: int | None = None
         self._newest: tuple[int, Array] | None = None
-        self._mean: Array | None = None
-        self._squares: Array | None = None
+        self._readings: deque[Array] = deque(maxlen=_COMPARED)
+        self._far, self._off = 0, np.zeros(len(self._counts), dtype=int)
+        """Readings in a row in which any motor is far off; and for each motor, in which it is off at all."""
 
-    def is_touched(self, torques: Array | None, stamp_ns: int | None) -> bool:
-        """Take the newest reading; whether something pushes on a link.
+    @property
+    def is_touched(self) -> bool:
+        """Whether something pushes so hard on a link that any motor shows it."""
+        return self._far >= _READINGS
+
+    @property
+    def pushed(self) -> NDArray[np.bool_]:
+        """Motors that show a push if they stand still, shape (20,)."""
+        return np.asarray(self._off >= self._in_a_row)
+
+    def take(self, torques: Array | None, stamp_ns: int | None) -> None:
+        """Judge the newest reading.
 
         Args:
             torques: counts of all motors, shape (20,), None if the hand reports none.
             stamp_ns: when it arrived. A reading that was judged before is not a second one that says so.
         """
         if torques is None or stamp_ns is None or (self._newest is not None and stamp_ns == self._newest[0]):
-            return self._suspicious >= _READINGS
+            return
         before = torques if self._newest is None else self._newest[1]
         self._newest = stamp_ns, torques
         if self._began_ns is None:
             self._began_ns = stamp_ns
         if stamp_ns - self._began_ns < _JERK_ns:
-            return False
-        if self._mean is None or self._squares is None:
-            self._mean, self._squares = torques.astype(float), np.zeros(len(torques))
-            return False
-        off = np.abs(torques - self._mean)
-        far = off > np.maximum(_LEAST_COUNTS, _SIGMAS * self._sigma())
-        if far.any():
-            self._suspicious += bool((torques != before)[far].any())
-            return self._suspicious >= _READINGS
-        self._suspicious = 0
-        self._learn(torques)
-        return False
+            return
+        if len(self._readings) >= _LEAST_COMPARED:
+            self._judge(torques, torques != before)
+        self._readings.append(torques)
 
-    def _sigma(self) -> Array:
-        assert self._squares is not None
-        return np.asarray(np.sqrt(self._squares / max(1, self._learned)))
-
-    def _learn(self, torques: Array) -> None:
-        assert self._mean is not None
-        assert self._squares is not None
-        self._learned += 1
-        before = torques - self._mean
-        self._mean = self._mean + before / (self._learned + 1)
-        self._squares = self._squares + before * (torques - self._mean)
+    def _judge(self, torques: Array, is_new: NDArray[np.bool_]) -> None:
+        known = np.array(self._readings)
+        usual = np.median(known, axis=0)
+        sigma = _MAD_TO_SIGMA * np.median(np.abs(known - usual), axis=0)
+        off = np.abs(torques - usual)
+        far = off > np.maximum(_LEAST_COUNTS, _SIGMAS * sigma)
+        self._far = self._far + bool(is_new[far].any()) if far.any() else 0
+        is_off = off > np.maximum(self._counts, self._sigmas * sigma)
+        self._off = np.where(is_off, self._off + is_new, 0)

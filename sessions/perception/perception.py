@@ -90,8 +90,8 @@ class Perception:
         form: HandForm = RIGHT_HAND,
         motors: MotorMap | None = None,
     ) -> None:
-        self.form = form
-        """Which hand it is."""
+        self.form, self.motors = form, motors
+        """Which hand it is, and which motor pulls which joint; None if that is not known."""
         self._wrench = dict(wrench_fingertips or {})
         self._slots = dict(slot_fingertips or {})
         everyone: dict[str, FingertipSensor] = {**self._wrench, **self._slots}

@@ -115,6 +115,9 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, one grasp follows the
         contacts alone.
         """
+        return replace(self._next(index), may_rise=self._dimension == 3)
+
+    def _next(self, index: int) -> GraspPlan:
         if (beside := self._beside(index)) is not None:
             return beside
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None

@@ -17,6 +17,7 @@ BRISK = {
     "turn_rad_s": 3.0,
     "descent_m_s": 0.1,
     "landing_m_s": 0.03,
+    "links_landing_m_s": 0.03,
     "finger_rad_s": 3.0,
     "closing_m_s": 0.045,
     "squeeze_s": 0.3,

@@ -22,6 +22,8 @@ from drivers.shadow.model.bodies import FOREARM, LINK_SHAPES, Ball, Block, Capsu
 from drivers.shadow.model.kinematics import JOINT_INDEX, JOINTS, forearm_T_palm, link_T_matrices
 
 _SPACING_m = 0.012
+_INSIDE_m = 0.012
+"""A fingertip passes an object at least so far off where it is expected to."""
 _STRAIGHT = np.zeros(len(JOINTS))
 
 
@@ -61,6 +63,24 @@ def open_hand(name: str, height_m: float, hand: HandShape) -> HandEnvelope:
         np.concatenate([palm_m, links.centres_m[first, np.arange(len(first))], tips_m]),
         np.concatenate([palm_radii_m, links.radii_m, np.full(len(tips_m), max(hand.semi_axes_m))]),
     )
+
+
+@lru_cache(maxsize=128)
+def lowest_inside_m(name: str, height_m: float, hand: HandShape) -> float:
+    """Height over the table of the lowest link of the open hand that meets what its fingertip passes by: it reaches
+    farther towards the other side of the grasp. Kept in memory.
+
+    Raises:
+        ConfigurationError: no such closing, or a height the hand cannot work at.
+    """
+    table, links = closing(name, height_m, hand), link_balls(name, height_m, hand)
+    first = np.argmax(links.usable, axis=0)[links.fingers]
+    centres_m = links.centres_m[first, np.arange(len(first))]
+    paths = [table.path(finger) for finger in table.fingers]
+    tips_m = np.array([path.centre_m(path.valid[0]) for path in paths])[links.fingers]
+    ways = np.array([path.direction for path in paths])[links.fingers]
+    inside_m = np.einsum("nk,nk->n", centres_m - tips_m, ways) + links.radii_m - hand.radius_m
+    return float((centres_m[:, 2] - links.radii_m)[inside_m > _INSIDE_m].min(initial=np.inf))
 
 
 def _palm_and_forearm(table: Closing) -> tuple[Array, Array]:

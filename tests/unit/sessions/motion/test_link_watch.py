@@ -7,6 +7,7 @@ import numpy as np
 from sessions.motion.link_watch import LinkWatch
 
 CYCLE_ns = 10_000_000
+WRIST = np.arange(20) == 8
 
 
 def counts(rng: np.random.Generator, pushed: float = 0.0) -> np.ndarray:
@@ -15,10 +16,15 @@ def counts(rng: np.random.Generator, pushed: float = 0.0) -> np.ndarray:
     return torques
 
 
+def is_touched(watch: LinkWatch, torques: np.ndarray | None, stamp_ns: int) -> bool:
+    watch.take(torques, stamp_ns)
+    return watch.is_touched
+
+
 def cycles_until_touched(pushed: float, begins: int, cycles: int = 400) -> int | None:
-    rng, watch = np.random.default_rng(0), LinkWatch()
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
     for cycle in range(cycles):
-        if watch.is_touched(counts(rng, pushed if cycle >= begins else 0.0), cycle * CYCLE_ns):
+        if is_touched(watch, counts(rng, pushed if cycle >= begins else 0.0), cycle * CYCLE_ns):
             return cycle
     return None
 
@@ -32,39 +38,39 @@ def test_a_push_is_told_in_its_second_reading() -> None:
 
 
 def test_a_lone_jerk_and_the_jerk_of_starting_are_no_touch() -> None:
-    rng, watch = np.random.default_rng(0), LinkWatch()
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
     pushes = [900.0 if cycle < 20 or cycle == 100 else 0.0 for cycle in range(200)]
-    assert not any(watch.is_touched(counts(rng, push), stamp * CYCLE_ns) for stamp, push in enumerate(pushes))
+    assert not any(is_touched(watch, counts(rng, push), stamp * CYCLE_ns) for stamp, push in enumerate(pushes))
 
 
 def test_a_lone_jerk_that_is_looked_at_twice_is_no_touch() -> None:
     """A hand whose statuses come more rarely than the session looks at them."""
-    rng, watch = np.random.default_rng(0), LinkWatch()
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
     readings = [counts(rng, 900.0 if number == 100 else 0.0) for number in range(200)]
     assert not any(
-        watch.is_touched(reading, stamp * CYCLE_ns) for stamp, reading in enumerate(readings) for _ in range(2)
+        is_touched(watch, reading, stamp * CYCLE_ns) for stamp, reading in enumerate(readings) for _ in range(2)
     )
 
 
 def test_a_lone_jerk_that_comes_in_two_answers_is_no_touch() -> None:
     """A hand that is heard twice for every reading of a motor."""
-    rng, watch = np.random.default_rng(0), LinkWatch()
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
     readings = [counts(rng, 900.0 if number == 200 else 0.0) for number in range(400)]
-    assert not any(watch.is_touched(readings[cycle // 2], cycle * CYCLE_ns // 5) for cycle in range(800))
+    assert not any(is_touched(watch, readings[cycle // 2], cycle * CYCLE_ns // 5) for cycle in range(800))
 
 
 def test_a_motion_starts_with_a_jerk_that_takes_as_long_however_often_the_hand_is_heard() -> None:
     for cycle_ns in (CYCLE_ns, CYCLE_ns // 10):
-        rng, watch = np.random.default_rng(0), LinkWatch()
+        rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
         jerk = 240_000_000 // cycle_ns
         pushes = [900.0 if cycle < jerk else 0.0 for cycle in range(4 * jerk)]
-        assert not any(watch.is_touched(counts(rng, push), cycle * cycle_ns) for cycle, push in enumerate(pushes))
+        assert not any(is_touched(watch, counts(rng, push), cycle * cycle_ns) for cycle, push in enumerate(pushes))
 
 
 def test_a_touch_stays_one_until_something_else_is_heard() -> None:
-    rng, watch = np.random.default_rng(0), LinkWatch()
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
     told = [
-        watch.is_touched(counts(rng, 900.0 if stamp >= 100 else 0.0), min(stamp, 101) * CYCLE_ns)
+        is_touched(watch, counts(rng, 900.0 if stamp >= 100 else 0.0), min(stamp, 101) * CYCLE_ns)
         for stamp in range(110)
     ]
     assert not any(told[:101])
@@ -72,12 +78,41 @@ def test_a_touch_stays_one_until_something_else_is_heard() -> None:
 
 
 def test_a_new_motion_is_compared_with_itself() -> None:
-    rng, watch = np.random.default_rng(0), LinkWatch()
-    assert not any(watch.is_touched(counts(rng), stamp * CYCLE_ns) for stamp in range(100))
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
+    assert not any(is_touched(watch, counts(rng), stamp * CYCLE_ns) for stamp in range(100))
     watch.restart()
-    assert not any(watch.is_touched(counts(rng, 900.0), (100 + stamp) * CYCLE_ns) for stamp in range(100))
+    assert not any(is_touched(watch, counts(rng, 900.0), (100 + stamp) * CYCLE_ns) for stamp in range(100))
+
+
+def test_a_push_that_grows_slowly_is_told() -> None:
+    """A link that comes down on a rim: what grows over half a second must not become what is usual."""
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
+    told = [is_touched(watch, counts(rng, max(0, cycle - 200) * 8.0), cycle * CYCLE_ns) for cycle in range(270)]
+    assert not any(told[:200])
+    assert told[240]
+
+
+def cycle_of_a_push(pushed: float, jerks: tuple[int, ...] = ()) -> int | None:
+    """The cycle in which motor 18 shows a push that begins at the 200th if it stands still; None if it does not."""
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
+    for cycle in range(400):
+        shown = 130.0 if cycle in jerks else pushed if cycle >= 200 else 0.0
+        watch.take(np.round(counts(rng, shown)), cycle * CYCLE_ns)
+        if watch.pushed.any():
+            assert watch.pushed[18]
+            return cycle
+    return None
+
+
+def test_a_motor_that_stands_still_tells_a_light_push_in_its_third_reading() -> None:
+    assert cycle_of_a_push(60.0) == 202
+    assert cycle_of_a_push(0.0) is None
+
+
+def test_a_motor_that_stands_still_tells_nothing_of_lone_jerks() -> None:
+    assert cycle_of_a_push(0.0, jerks=(26, 27, 100, 101, 150)) is None
 
 
 def test_a_hand_without_strain_gauges_tells_nothing() -> None:
-    watch = LinkWatch()
-    assert not any(watch.is_touched(None, stamp * CYCLE_ns) for stamp in range(50))
+    watch = LinkWatch(WRIST)
+    assert not any(is_touched(watch, None, stamp * CYCLE_ns) for stamp in range(50))
