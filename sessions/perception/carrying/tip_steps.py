@@ -8,7 +8,7 @@ rolling. Contacts are expressed in the middle of the step, so that a turn of the
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from scipy.ndimage import gaussian_filter1d
 from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import FINGERS, LARGEST_SLOPE, Array
 from drivers.core.fingertip import ContinuousFingertip, TipTouches
+from drivers.force.force_fingertip import ForceTip
+from drivers.force.touches import TipSensing
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix, palm_T_distal_matrices
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples, SAMPLE_ns
@@ -107,12 +109,20 @@ def _felt(readings: Array, world_R_distal: Array, fingertips: Mapping[str, Conti
     points_m, normals, forces_N = (np.zeros((*shape, 3)) for _ in range(3))
     no, yes = np.zeros(shape, dtype=bool), np.ones(shape, dtype=bool)
     felt = TipTouches(points_m, normals, np.zeros(shape), forces_N, no, yes)
+    together = {FINGERS.index(finger): tip for finger, tip in fingertips.items() if isinstance(tip, ForceTip)}
+    if together:
+        at = list(together)
+        sensing = TipSensing.together([tip.sensing for tip in together.values()])
+        _put(sensing.touches(readings[:, at], world_R_distal[:, at]), felt, at)
     for finger, tip in fingertips.items():
-        at = FINGERS.index(finger)
-        touches = tip.touches(readings[:, at], world_R_distal[:, at])
-        for name in TipTouches.__dataclass_fields__:
-            getattr(felt, name)[:, at] = getattr(touches, name)
+        if (alone := FINGERS.index(finger)) not in together:
+            _put(tip.touches(readings[:, alone], world_R_distal[:, alone]), felt, alone)
     return felt
+
+
+def _put(touches: TipTouches, into: TipTouches, at: int | list[int]) -> None:
+    for each in fields(TipTouches):
+        getattr(into, each.name)[:, at] = getattr(touches, each.name)
 
 
 def _moments(points_m: Array, pushes_N: Array, forces_N: Array) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,13 @@ from gtsam import Rot3
 from drivers.ati.nano17 import Nano17, Nano17Settings
 from drivers.core.clock import VirtualClock
 from drivers.core.errors import DeviceError
-from drivers.core.fingertip import FingertipCalibration, RigidTransform, load_fingertips
+from drivers.core.fingertip import FingertipCalibration, RigidTransform, TipTouches, load_fingertips
 from drivers.core.transports import ReplayTransport
 from drivers.force.force_samples import WrenchSample
 from drivers.force.intrinsic_contact import contact_covariance, contact_jacobian, contact_on_ellipsoid, wrench_transform
 from drivers.force.plausibility import PlausibilitySettings, WrenchMonitor, noise_objection, objection
 from drivers.force.sequences import SequenceMonitor
-from drivers.force.touches import tip_touches
+from drivers.force.touches import TipSensing
 from tests.support.baseline import assert_baseline
 from tests.support.plain_values import plain
 from tests.support.repository import SIMULATED_HAND
@@ -52,13 +53,15 @@ def test_contacts_of_wrenches_on_an_ellipsoid() -> None:
     )
     limits = PlausibilitySettings(torsion_m=1e-3)
     is_void = np.arange(len(loads)) % 5 == 4
+    sensing = TipSensing.of(shell, limits, np.eye(6), np.zeros((6, 3)))
+    touches = sensing.contacts(loads[:, None], is_void[:, None])
     found = {
         "contacts": plain(contacts),
         "jacobian": contact_jacobian(single[0], loads[0, :3], AXES),
         "covariance": [1e6 * np.array(pair[0]) for pair in covariances],
         "bend": [pair[1] for pair in covariances],
         "objections": [objection(each, load[:3], shell, limits) for each, load in zip(single, loads, strict=True)],
-        "touches": plain(tip_touches(loads, is_void, shell, limits)),
+        "touches": plain(TipTouches(*(getattr(touches, each.name)[:, 0] for each in fields(touches)))),
         "moved": wrench_transform(TILTED, np.array([0.01, -0.02, 0.03])),
     }
     assert_baseline("force/contacts", found, rtol=1e-5, atol=1e-9)
