@@ -108,6 +108,10 @@ class Polyhedron:
         sigma_m = self._sigma(fine, kept, caps)
         return SurfaceMesh(fine.vertices_m, fine.triangles, sigma_m, area_weighted_normals(fine), is_closed=True)
 
+    def moves_m(self, places_m: Array, normals: Array) -> Array:
+        """How one standard deviation of each error of the planes moves the surface along its normals, shape (q, m)."""
+        return self._scatter * self._regular.moves_m(places_m, normals)
+
     def _build(self, floor_m: float | None) -> tuple[FacetMesh, RegularPlanes, tuple[Cap, ...]]:
         """The coarse body, its planes, and the caps that come after them."""
         kept = _drop_lone_planes(self._regular)

@@ -10,6 +10,9 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.shape.regularities import RegularNormals, regular_normals
 from tactile_lab.slam.shape.solids.planes import Planes, WeightedContacts
 
+_FACING = 0.9
+"""Cosine of the angle between a plane's normal and that of a surface on it, at least."""
+
 
 @dataclass(frozen=True)
 class RegularPlanes:
@@ -37,6 +40,32 @@ class RegularPlanes:
         arms = points_m - self.middles_m[plane]
         turned = np.einsum("qi,ij,qj->q", arms, self.turn_covariances[plane], arms)
         return np.asarray(np.sqrt(np.maximum(turned, 0.0) + self.offset_variances_m2[plane]))
+
+    def moves_m(self, points_m: Array, normals: Array) -> Array:
+        """How one standard deviation of each error of the planes moves points of a surface along their normals.
+
+        Args:
+            points_m, normals: shape (q, 3); a point lies on the nearest plane that faces its way.
+
+        Returns:
+            Shape (q, 4 S).
+        """
+        planes, moves = self.planes, np.zeros((len(points_m), self.planes.count, 4))
+        facing = normals @ planes.normals.T > _FACING
+        away = np.where(facing, np.abs(points_m @ planes.normals.T - planes.offsets_m), np.inf)
+        plane, held = away.argmin(axis=1), np.flatnonzero(facing.any(axis=1))
+        roots = [_root(each) for each in self.turn_covariances]
+        for point in held:
+            at = plane[point]
+            turned = (points_m[point] - self.middles_m[at]) @ roots[at]
+            moves[point, at] = [*turned, np.sqrt(self.offset_variances_m2[at])]
+        return moves.reshape(len(points_m), -1)
+
+
+def _root(covariance: Array) -> Array:
+    """A square root of a covariance that may be singular."""
+    values, vectors = np.linalg.eigh(covariance)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
 
 
 def regularise(contacts: WeightedContacts, planes: Planes, *, upright: bool, regular: bool = True) -> RegularPlanes:

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
@@ -61,16 +62,29 @@ def propagate_pose_uncertainty(
     changes = _changes(used, noise, places_m[:, axes], normals[:, axes], faceted=_has_flat_faces(shape))
     fit = _BestFit.of(places_m, normals, extracted.sigma_m, on_table=contact_map.space is PLANAR)
     by_poses, by_fingers, as_if_anew = (_variance(fit.leaves(each)) for each in changes)
-    own = extracted.sigma_m**2
-    if isinstance(extracted, Contour) and isinstance(shape, Polygon | GpisShape):
-        own = np.maximum(own - fit.takes(shape.covariance_m2(places_m)), 0.0)
-    anew = own + by_poses
+    anew = np.maximum(extracted.sigma_m**2 - _taken(extracted, shape, fit), 0.0) + by_poses
     least = _least_own_share(used.contacts_world) * anew
     return replace(
         extracted,
         sigma_m=np.sqrt(np.maximum(anew - as_if_anew, least) + by_fingers),
         shared_sigma_m=float(np.sqrt(np.median(by_fingers))),
     )
+
+
+def _taken(extracted: Contour | SurfaceMesh, shape: FittedShape, fit: _BestFit) -> Array:
+    """By how much the best fit reduces the model's own variance at each place, shape (q,); 0 where it is not known."""
+    if isinstance(extracted, Contour) and isinstance(shape, Polygon | GpisShape):
+        return fit.takes(shape.covariance_m2(extracted.points_m))
+    if isinstance(extracted, SurfaceMesh) and isinstance(shape, Polyhedron):
+        moves = shape.moves_m(extracted.vertices, extracted.normals)
+        return _variance(moves) - _variance(fit.leaves(moves))
+    taken = np.zeros(len(extracted.sigma_m))
+    if isinstance(extracted, SurfaceMesh) and isinstance(shape, Prism):
+        walls, section = on_walls(extracted.normals), shape.section
+        of_section = _BestFit.of(section.points_m, section.normals, section.sigma_m, on_table=True)
+        nearest = cKDTree(section.points_m).query(extracted.vertices[walls, :2])[1]
+        taken[walls] = _taken(section, shape.outline, of_section)[nearest]
+    return taken
 
 
 def _variance(change: Array) -> Array:

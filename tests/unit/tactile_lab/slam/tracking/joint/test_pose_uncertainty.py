@@ -54,9 +54,10 @@ def nudged(known: ContactMap, step: Array) -> ContactMap:
 @pytest.mark.parametrize("shape", MODELS)
 def test_poses_add_to_the_sigma_of_a_surface_and_change_nothing_else(shape: str) -> None:
     given, doubtful = doubted(shape)
+    _, held = doubted(shape, HELD)
     assert doubtful.vertices is given.vertices
-    assert np.all(doubtful.sigma_m >= given.sigma_m)
-    added_mm = 1e3 * np.sqrt(np.median(doubtful.sigma_m**2 - given.sigma_m**2))
+    assert np.all(doubtful.sigma_m >= held.sigma_m - 1e-9)
+    added_mm = 1e3 * np.sqrt(np.median(doubtful.sigma_m**2 - held.sigma_m**2))
     assert 0.05 < added_mm < 1.0
 
 
@@ -75,9 +76,26 @@ def test_poses_are_in_doubt_from_the_second_grasp_on() -> None:
 
 
 @pytest.mark.parametrize("shape", MODELS)
-def test_where_the_object_hardly_slips_poses_add_hardly_anything(shape: str) -> None:
+def test_where_the_object_hardly_slips_the_best_fit_only_takes(shape: str) -> None:
+    """But for places that hardly count in the fit, as they are not well known."""
     given, doubtful = doubted(shape, HELD)
-    assert np.allclose(doubtful.sigma_m, given.sigma_m, atol=2e-5)
+    assert np.all(doubtful.sigma_m < 1.15 * given.sigma_m + 2e-5)
+    walls = np.abs(given.normals[:, 2]) < 1e-6
+    if shape == "sphere":  # nothing is said of how its places are wrong together
+        assert np.allclose(doubtful.sigma_m, given.sigma_m, atol=2e-5)
+    else:
+        assert np.median(doubtful.sigma_m[walls]) < 0.9 * np.median(given.sigma_m[walls])
+
+
+def test_planes_move_a_surface_as_much_as_they_state() -> None:
+    model = Polyhedron.fit(true_map("box-12x6x6", count=12, dimension=3).fit())
+    mesh = model.mesh(COARSE_m, TABLE_m)
+    moves = model.moves_m(mesh.vertices, mesh.normals)
+    inner = np.abs(mesh.normals).max(axis=1) > 1 - 1e-9
+    own_m = np.sqrt(np.sum(moves**2, axis=1))[inner & (mesh.normals[:, 2] > -0.5)]
+    told_m = mesh.sigma_m[inner & (mesh.normals[:, 2] > -0.5)]
+    assert np.all(own_m < told_m * 1.001)
+    assert np.median(own_m / told_m) > 0.9
 
 
 @pytest.mark.parametrize("shape", ["box-12x6x6", "cylinder"])
