@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from gtsam import Pose2
-from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip
@@ -18,6 +16,7 @@ from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
 from sessions.perception.carrying.lifted import lifted_motions, raised
 from sessions.perception.carrying.planar_motions import displacement, planar_matrices
+from sessions.perception.carrying.resistance import Resistance
 from sessions.perception.carrying.roundness import Roundness
 from sessions.perception.carrying.tilt import tilt_rad
 from sessions.perception.carrying.tip_steps import TipSteps, tip_steps
@@ -26,13 +25,6 @@ _ITERATIONS, _ITERATIONS_OF_OTHERS = 12, 4
 _LEAST_HALF_WIDTH_m, _LARGEST_HALF_WIDTH_m = 0.017, 0.083
 _FAR_m, _FAR_rad = 0.004, float(np.deg2rad(5.0))
 """A slip that a person should hear of: more than half of the rigs' usual ones."""
-_RESISTED_SHARES, _RESISTED_TURNS = (0.08, 0.2), (0.3, 0.7)
-"""Net force, and net moment over the mean lever, beyond the table's friction, over the sum of normal forces: of 199
-carries over a table 0 and 0.3 at most, of jammed objects 0.1 to 0.3 or 0.6 to 0.9.
-"""
-_RESISTS, _RESISTS_AROUND = 0.25, 11
-"""Beyond this nothing is believed, nor in as many steps around it, in which the force builds up and fades."""
-_LEAST_LEVER_m = 0.01
 _CLOSES_m_s = 0.008
 """Fingers that feel nothing go on closing this fast, and may push the object with a link."""
 _USUAL_NET_N, _PUSHED_SHARE = 0.8, 0.9
@@ -158,20 +150,22 @@ class CarryOdometry:
         ends = np.array([displacement(motion, middle) for motion in motions])
         slip = displacement(np.linalg.inv(palm) @ motions[0], middle)
         loose_s, single_s = (float(steps.step_s @ (steps.felt.sum(axis=1) == count)) for count in (0, 1))
-        tilted_rad, resistance = tilt_rad(steps), _resistance(steps, usual)
-        resists = _resists(steps, resistance)
-        doubt = np.maximum(resistance, maximum_filter1d(resists, _RESISTS_AROUND))
+        tilted_rad, resistance = tilt_rad(steps), Resistance.of(steps, usual)
         void_s = steps.step_s @ (steps.is_void & [finger in self._fingertips for finger in FINGERS])
         return Carry(
             motion=_pose(motions[0]),
             sigma=self._sigma(
-                ends.std(axis=0), slip, steps, balance, self._unseen(steps, balance.centres_m, tilted_rad, doubt)
+                ends.std(axis=0),
+                slip,
+                steps,
+                balance,
+                self._unseen(steps, balance.centres_m, tilted_rad, resistance.doubt),
             ),
             slip_m=float(np.hypot(*slip[:2])),
             slip_rad=float(abs(slip[2])),
             loose_s=loose_s,
             single_s=single_s,
-            resisted_N=_resisted_N(steps, resists),
+            resisted_N=resistance.resisted_N,
             tilted_rad=tilted_rad,
             void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
             sliding=_sliding_ratios(steps, balance.sliding_m(best)),
@@ -233,41 +227,10 @@ def _sliding_ratios(steps: TipSteps, sliding_m: Array) -> Array:
     return np.asarray(steps.tangential_N[slides] / steps.forces_N[slides])
 
 
-def _resistance(steps: TipSteps, table: Friction) -> Array:
-    """How little the fingertips can be believed to stick in each step, 0 to 1, shape (n,): by the force and the moment
-    with which they push the object, beyond what the table's friction explains, over how hard they press.
-    """
-    pushes_N = np.column_stack([np.linalg.norm(steps.net_forces_N[:, :2], axis=1), _turning_N(steps)])
-    usual_N = np.column_stack([np.ones(len(steps)), table.foot_m / np.maximum(steps.levers_m, _LEAST_LEVER_m)])
-    beyond_N = np.maximum(pushes_N - max(table.table_N, Friction.table_N) * usual_N, 0.0)
-    low, high = np.array([_RESISTED_SHARES, _RESISTED_TURNS]).T
-    shares = beyond_N / np.maximum(steps.forces_N.sum(axis=1), 1e-9)[:, None]
-    return np.asarray((np.clip((shares - low) / (high - low), 0.0, 1.0) ** 2).max(axis=1))
-
-
-def _resists(steps: TipSteps, resistance: Array) -> NDArray[np.bool_]:
-    """Steps in which it resists at least two fingertips, shape (n,); none where that is too short to tell."""
-    flags = (resistance > _RESISTS) & (steps.felt.sum(axis=1) > 1)
-    return np.asarray(flags & bool(steps.step_s @ flags >= _NO_HOLD_s))
-
-
-def _turning_N(steps: TipSteps) -> Array:
-    """The moment with which the fingertips turn the object, as a force at their mean lever, shape (n,)."""
-    return np.asarray(np.abs(steps.moments_Nm) / np.maximum(steps.levers_m, _LEAST_LEVER_m))
-
-
 def _pushed_N(steps: TipSteps) -> float:
     """Net force of the fingertips beyond what a table's friction explains, N."""
     net_N = np.linalg.norm(steps.net_forces_N[:, :2], axis=1)
     return float(max(np.quantile(net_N, _PUSHED_SHARE) - _USUAL_NET_N, 0.0))
-
-
-def _resisted_N(steps: TipSteps, resists: NDArray[np.bool_]) -> float:
-    """Mean force with which the fingertips pushed or turned the object while it resisted; 0 if it hardly did."""
-    if not resists.any():
-        return 0.0
-    pushes_N = np.maximum(np.linalg.norm(steps.net_forces_N[:, :2], axis=1), _turning_N(steps))
-    return float(pushes_N[resists].mean())
 
 
 def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, ContinuousFingertip], doubt: Array) -> Array:

@@ -128,6 +128,16 @@ def test_the_tables_friction_is_no_jam_however_few_fingertips_drag_the_object(fe
     assert carry.problems == ()
 
 
+def test_fingertips_that_press_little_for_what_they_push_are_not_believed_to_stick():
+    """0.9 N are no jam, but 0.3 N a fingertip hardly hold against them."""
+    firm, light = (carried(BOX, object_motion=TURN, palm_motion=TURN) for _ in range(2))
+    for steps in (firm, light):
+        steps.net_forces_N[:] = [0.9, 0.0, 0.0]
+    light.forces_N[:] *= 0.3
+    assert odometry().carry(light).resisted_N == 0.0
+    assert odometry().carry(light).sigma.rotation_rad > odometry().carry(firm).sigma.rotation_rad + 0.1 * TURN.theta()
+
+
 def test_a_jam_is_told_of_few_steps_and_what_is_around_them_is_not_believed():
     steps = carried(BOX, object_motion=TURN, palm_motion=TURN)
     sure = odometry().carry(steps).sigma
