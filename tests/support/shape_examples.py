@@ -22,6 +22,11 @@ def ellipse(long_m: float = 0.05, short_m: float = 0.03) -> Array:
     return np.column_stack([long_m * np.cos(angle), short_m * np.sin(angle)])
 
 
+def half_disc(radius_m: float = 0.035) -> Array:
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 240)
+    return radius_m * np.column_stack([np.cos(angle), np.sin(angle)]) - [0.4 * radius_m, 0.0]
+
+
 def l_block() -> Array:
     return np.array([[0, 0], [0.1, 0], [0.1, 0.04], [0.04, 0.04], [0.04, 0.08], [0, 0.08]]) - [0.04, 0.032]
 

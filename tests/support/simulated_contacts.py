@@ -18,7 +18,13 @@ def true_map(
     shape: str, seed: int = 0, count: int = 12, *, dimension: int = 2, settings: GpisSettings | None = None
 ) -> ContactMap:
     """Grasps at their true poses, the object frame being the body's."""
-    data = (planar_data if dimension == 2 else spatial_data).simulate(shape, seed, count=count)
+    return placed_truly(
+        (planar_data if dimension == 2 else spatial_data).simulate(shape, seed, count=count), dimension, settings
+    )
+
+
+def placed_truly(data: SimulatedGrasps, dimension: int, settings: GpisSettings | None = None) -> ContactMap:
+    """Simulated grasps at their true poses."""
     placed = [
         PlacedGrasp(
             ContactSet.of_grasp(grasp, dimension, 0.0),

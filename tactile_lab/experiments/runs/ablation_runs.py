@@ -82,6 +82,7 @@ WITHOUT: Mapping[str, Overlay] = MappingProxyType(
         "regular faces": _joint("regular faces"),
         "finger errors": _joint("finger errors"),
         "right angles": _shape("right angles"),
+        "round sides": _shape("round sides"),
         "face extents": _shape("face extents"),
         "corners": _shape("corners"),
         "contradictions": _shape("contradictions"),

@@ -28,6 +28,7 @@ ShapePart: TypeAlias = Literal[
     "held-out contacts",
     "corners",
     "right angles",
+    "round sides",
     "face extents",
 ]
 """Parts of the choice of the shape model, see docs/estimator.md."""

@@ -100,6 +100,13 @@ class Polygon:
         before, after = np.roll(self.edge_faces, 1)[self._is_corner], self.edge_faces[self._is_corner]
         return Corners.between(self.faces, np.column_stack([before, after]))
 
+    @property
+    def misfits(self) -> tuple[Array, Array]:
+        """How far each contact lies from its face's line, and how far its normal is turned from the face's, (n,)."""
+        normals = self.faces.normals[self.faces.labels]
+        across_m = np.abs(np.sum(self.contacts.points_m * normals, axis=1) - self.faces.offsets_m[self.faces.labels])
+        return across_m, np.arccos(np.clip(np.sum(self.contacts.normals * normals, axis=1), -1.0, 1.0))
+
     @cached_property
     def uncertainty(self) -> FaceUncertainty:
         """Uncertainty of the faces, including the observed scatter."""

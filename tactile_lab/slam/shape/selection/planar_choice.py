@@ -7,6 +7,9 @@ on it, and places where fingertips were are outside.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
@@ -19,10 +22,13 @@ from tactile_lab.slam.shape.planar.corners import at_corners
 from tactile_lab.slam.shape.planar.outlines import encloses
 from tactile_lab.slam.shape.planar.polygon import Polygon
 from tactile_lab.slam.shape.planar.regularity import with_right_angles
+from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.shape.planar.segmentation import PlanarContacts, segment
 from tactile_lab.slam.shape.selection.spatial_choice import best_spatial_shape
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour, extract_mesh, slope_of
+
+SharpOutline: TypeAlias = Polygon | RoundedOutline
 
 FINGERTIP_RADIUS_m = 0.006
 """Smallest thickness of a fingertip: the point this far outside of each contact is free."""
@@ -81,14 +87,42 @@ def best_shape(gpis: Gpis, free_points_m: Array | None = None, floor_m: float | 
         return field
     try:
         provisional = field.contour()
-        polygon = polygon_of(gpis, provisional)
-    except ShapeError:  # no outline, or no polygon: the field is the best description
+        sharp = sharp_outlines(gpis, provisional)
+    except ShapeError:  # no outline, or no sharp one: the field is the best description
         return field
     free = _free_points(gpis, free_points_m)
-    advantage = polygon.log_evidence - field.log_evidence
-    advantage += free_evidence(polygon.contour(), free, gpis) - free_evidence(provisional, free, gpis)
+    evidence = {one: one.log_evidence + free_evidence(one.contour(), free, gpis) for one in sharp}
+    likeliest = max(evidence, key=evidence.__getitem__)
+    advantage = evidence[likeliest] - field.log_evidence - free_evidence(provisional, free, gpis)
     likelier = advantage > 0 or "field" in without
-    return polygon if likelier and ("contradictions" in without or _holds_contacts(polygon)) else field
+    return likeliest if likelier and ("contradictions" in without or _holds_contacts(likeliest)) else field
+
+
+def sharp_outlines(gpis: Gpis, provisional: Contour) -> list[SharpOutline]:
+    """What a planar field's contacts can be but smooth: straight faces, and straight and round sides.
+
+    Raises:
+        ShapeError: nothing of that encloses anything.
+    """
+    without, found = gpis.settings.without, list[SharpOutline]()
+    makers: list[Callable[[], SharpOutline]] = [lambda: polygon_of(gpis, provisional)]
+    makers += [lambda: rounded_of(gpis, provisional)] if "round sides" not in without else []
+    problem = ShapeError("no outline is asked for")
+    for maker in makers:
+        try:
+            found.append(maker())
+        except ShapeError as error:
+            problem = error
+    if not found:
+        raise problem
+    return found
+
+
+def rounded_of(gpis: Gpis, provisional: Contour) -> RoundedOutline:
+    """The straight and round sides of a planar field's contacts, whatever their evidence. Raises ShapeError."""
+    seen = gpis.observations
+    contacts = PlanarContacts.of(gpis.contacts_m, gpis.normals, seen.value_sigma_m, seen.gradient_sigma)
+    return RoundedOutline.of(contacts, provisional.points_m)
 
 
 def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
@@ -152,18 +186,16 @@ def free_evidence(contour: Contour, free_points_m: Array, gpis: Gpis) -> float:
     return float(_FREE_WEIGHT * log_ndtr(outward / sigma).sum())
 
 
-def _holds_contacts(polygon: Polygon) -> bool:
-    """Whether all contacts but a few lie on the outline itself, not only on the lines of its faces, and none far along
+def _holds_contacts(outline: SharpOutline) -> bool:
+    """Whether all contacts but a few lie on the outline itself, not only on the lines of its sides, and none far along
     a line.
 
-    An outlier may lie anywhere. But a contact that continues a face, in position and direction, far beyond its end
-    shows that the object extends there: untouched faces are missing.
+    An outlier may lie anywhere. But a contact that continues a side, in position and direction, far beyond its end
+    shows that the object extends there: untouched sides are missing.
     """
-    contacts, faces = polygon.contacts, polygon.faces
-    away_m = distances_to_polygon(contacts.points_m, polygon.outline_m)
-    normals = faces.normals[faces.labels]
-    across_m = np.abs(np.sum(contacts.points_m * normals, axis=1) - faces.offsets_m[faces.labels])
-    turned_rad = np.arccos(np.clip(np.sum(contacts.normals * normals, axis=1), -1.0, 1.0))
+    contacts = outline.contacts
+    away_m = distances_to_polygon(contacts.points_m, outline.outline_m)
+    across_m, turned_rad = outline.misfits
     continues = (across_m < _ON_FACE_SIGMAS * contacts.point_sigma_m) & (
         turned_rad < _ON_FACE_SIGMAS * contacts.normal_sigma_rad
     )

@@ -14,7 +14,13 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.planar.polygon import Polygon
-from tactile_lab.slam.shape.selection.planar_choice import best_shape, free_evidence, polygon_of
+from tactile_lab.slam.shape.selection.planar_choice import (
+    SharpOutline,
+    best_shape,
+    free_evidence,
+    polygon_of,
+    sharp_outlines,
+)
 from tactile_lab.slam.shape.selection.spatial_choice import stray_cost
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
@@ -28,6 +34,7 @@ from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother, smoothed_with_faces
 from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
 from tactile_lab.slam.tracking.faces.regular_faces import made_regular
+from tactile_lab.slam.tracking.faces.side_smoothing import smoothed_with_sides
 from tactile_lab.slam.tracking.faces.solid_face_extents import solid_face_extents
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
@@ -141,8 +148,12 @@ class FacetedScorer:
 
     def smooth_with_facets(self, contact_map: ContactMap) -> Hypothesis | None:
         """Poses and faces smoothed together; None if there are no faces that enclose anything."""
-        faceted = smoothed_with_faces(contact_map, self._noise) if self._mechanisms.has("faces") else None
-        return self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
+        if not self._mechanisms.has("faces"):
+            return None
+        faceted = smoothed_with_faces(contact_map, self._noise)
+        found = self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
+        rounded = smoothed_with_sides(contact_map, self._noise) if contact_map.dimension == 2 else None
+        return found if rounded is None else _likelier_of(self._sharp(rounded), found)
 
     def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:
         """The unchanged map, its contacts explained by a sharp shape; None if there is none."""
@@ -203,10 +214,17 @@ def _explain(contact_map: ContactMap, fitted: Gpis) -> tuple[float, float]:
     """Log evidence of the best sharp shape, and the cost of the free places it fills. Raises ShapeError."""
     free = contact_map.free_points_m
     if contact_map.dimension == 2:
-        polygon = _polygon(fitted)
-        strays = stray_cost(*_away_from_m(polygon, fitted))
-        return polygon.log_evidence - strays, -free_evidence(polygon.contour(_ORDERING_RESOLUTION_m), free, fitted)
+        sharp = sharp_outlines(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+        explained = [_explained_by(outline, fitted, free) for outline in sharp]
+        return max(explained, key=lambda one: one[0] - one[1])
     return _best_solid(contact_map, fitted)[0], _intrusion(contact_map)
+
+
+def _explained_by(outline: SharpOutline, fitted: Gpis, free_m: Array) -> tuple[float, float]:
+    """As :func:`_explain`, for one outline."""
+    strays = stray_cost(*_away_from_m(outline, fitted))
+    intrusion = -free_evidence(outline.contour(_ORDERING_RESOLUTION_m), free_m, fitted)
+    return outline.log_evidence - strays, intrusion
 
 
 def _polygon(fitted: Gpis) -> Polygon:
@@ -214,9 +232,9 @@ def _polygon(fitted: Gpis) -> Polygon:
     return polygon_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
 
 
-def _away_from_m(polygon: Polygon, fitted: Gpis) -> tuple[Array, Array]:
+def _away_from_m(outline: SharpOutline, fitted: Gpis) -> tuple[Array, Array]:
     """Distances of all contacts from an outline, and the inverse variances of their noise, each of shape (n,)."""
-    return distances_to_polygon(fitted.contacts_m, polygon.outline_m), fitted.observations.value_sigma_m**-2.0
+    return distances_to_polygon(fitted.contacts_m, outline.outline_m), fitted.observations.value_sigma_m**-2.0
 
 
 def _intrusion(contact_map: ContactMap) -> float:
@@ -282,6 +300,10 @@ def _doubtful(contact_map: ContactMap) -> list[tuple[int, int]]:
     worst_first = doubts[np.argsort(-misfit[doubts], kind="stable")][:_MOST_DOUBTS]
     origins = contact_map.origins
     return [origins[i] for i in worst_first]
+
+
+def _likelier_of(one: Hypothesis | None, other: Hypothesis | None) -> Hypothesis | None:
+    return other if one is None else _likelier(one, other)
 
 
 def _likelier(one: Hypothesis, other: Hypothesis | None) -> Hypothesis:

@@ -18,10 +18,13 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
+from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
 from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
+from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
 
 _STEP = 1e-6
 
@@ -58,11 +61,19 @@ def with_covariances(contact_map: ContactMap, covariances: Array) -> ContactMap:
 def _of_poses(contact_map: ContactMap, noise: MotionNoise) -> Array:
     """Joint covariance of all poses but the first."""
     try:
-        found = FacetCertainty.of(contact_map, noise)
+        found = _certainty(contact_map, noise)
     except (ShapeError, np.linalg.LinAlgError):  # the contacts enclose nothing, or too few of them form faces
         return np.asarray(np.linalg.inv(PoseEvidence(contact_map, noise).information(contact_map.rows)))
     given_errors = np.linalg.inv(found.information_of_poses)
     return np.asarray(given_errors + found.poses_by_errors @ found.poses_by_errors.T)
+
+
+def _certainty(contact_map: ContactMap, noise: MotionNoise) -> FacetCertainty | SideCertainty:
+    """Of flat faces, or of straight and round sides where these are likelier. Raises ShapeError, LinAlgError."""
+    shape = best_shape(contact_map.fit(), contact_map.free_points_m) if contact_map.dimension == 2 else None
+    if isinstance(shape, RoundedOutline):
+        return SideCertainty.of(contact_map, noise, shape)
+    return FacetCertainty.of(contact_map, noise)
 
 
 def _palm(contact_map: ContactMap, noise: MotionNoise) -> Array:

@@ -27,6 +27,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.planar.polygon import Polygon
+from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.shape.selection.planar_choice import GpisShape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, on_walls
@@ -37,6 +38,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
 from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
+from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
 
 _Extracted = TypeVar("_Extracted", Contour, SurfaceMesh)
 
@@ -59,7 +61,7 @@ def propagate_pose_uncertainty(
     normals = extracted.normals
     used = _walls(contact_map) if isinstance(shape, Prism) else contact_map
     axes = slice(0, used.dimension)
-    changes = _changes(used, noise, places_m[:, axes], normals[:, axes], faceted=_has_flat_faces(shape))
+    changes = _changes(used, noise, places_m[:, axes], normals[:, axes], shape)
     fit = _BestFit.of(places_m, normals, extracted.sigma_m, on_table=contact_map.space is PLANAR)
     by_poses, by_fingers, as_if_anew = (_variance(fit.leaves(each)) for each in changes)
     anew = np.maximum(extracted.sigma_m**2 - _taken(extracted, shape, fit), 0.0) + by_poses
@@ -73,7 +75,7 @@ def propagate_pose_uncertainty(
 
 def _taken(extracted: Contour | SurfaceMesh, shape: FittedShape, fit: _BestFit) -> Array:
     """By how much the best fit reduces the model's own variance at each place, shape (q,); 0 where it is not known."""
-    if isinstance(extracted, Contour) and isinstance(shape, Polygon | GpisShape):
+    if isinstance(extracted, Contour) and isinstance(shape, Polygon | RoundedOutline | GpisShape):
         return fit.takes(shape.covariance_m2(extracted.points_m))
     if isinstance(extracted, SurfaceMesh) and isinstance(shape, Polyhedron):
         moves = shape.moves_m(extracted.vertices, extracted.normals)
@@ -98,7 +100,7 @@ def _least_own_share(contacts: ContactSet) -> float:
 
 
 def _changes(
-    contact_map: ContactMap, noise: MotionNoise, places_m: Array, normals: Array, *, faceted: bool
+    contact_map: ContactMap, noise: MotionNoise, places_m: Array, normals: Array, shape: FittedShape
 ) -> tuple[Array, Array, Array]:
     """Displacements of a surface along its normals by independent standard normal variables, shapes (q, m): by the
     poses, by what contacts of one finger share, and by the same if it were drawn anew for each contact.
@@ -107,13 +109,10 @@ def _changes(
         contact_map: see above, contacts in the plane or in space.
         noise: of the motion model.
         places_m, normals: of the surface, shape (q, d); in the plane normals are shorter where it is inclined.
-        faceted: the object has flat faces.
+        shape: of the object, whose sides or faces bind the poses.
     """
-    try:
-        certainty: FacetCertainty | None = FacetCertainty.of(contact_map, noise)
-    except (ShapeError, np.linalg.LinAlgError):  # the contacts enclose nothing without the rest
-        certainty = None
-    if faceted and certainty is not None:
+    certainty = _certainty(contact_map, noise, shape)
+    if _is_sharp(shape) and certainty is not None:
         information, change = certainty.information_of_poses, certainty.surface_change(places_m, normals)
     else:
         evidence = PoseEvidence(contact_map, noise)
@@ -125,7 +124,7 @@ def _changes(
 
 
 def _shared_changes(
-    contact_map: ContactMap, certainty: FacetCertainty | None, places_m: Array, normals: Array
+    contact_map: ContactMap, certainty: FacetCertainty | SideCertainty | None, places_m: Array, normals: Array
 ) -> tuple[Array, Array]:
     """Displacement of a surface by what the contacts of each finger share, shape (q, fingers), and by the same if each
     contact had it by itself, shape (q, n).
@@ -174,10 +173,26 @@ class _BestFit:
         return np.asarray(np.sum(self.by_motions * (2 * with_motions - of_motions), axis=1))
 
 
-def _has_flat_faces(shape: FittedShape) -> bool:
-    if isinstance(shape, Prism):
-        return _has_flat_faces(shape.outline)
-    return isinstance(shape, Polygon | Polyhedron)
+def _certainty(
+    contact_map: ContactMap, noise: MotionNoise, shape: FittedShape
+) -> FacetCertainty | SideCertainty | None:
+    """Of the outline's sides where some are round, otherwise of flat faces; None if these enclose nothing."""
+    outline = _outline(shape)
+    try:
+        if isinstance(outline, RoundedOutline):
+            return SideCertainty.of(contact_map, noise, outline)
+        return FacetCertainty.of(contact_map, noise)
+    except (ShapeError, np.linalg.LinAlgError):  # the contacts enclose nothing without the rest
+        return None
+
+
+def _is_sharp(shape: FittedShape) -> bool:
+    return isinstance(_outline(shape), Polygon | RoundedOutline | Polyhedron)
+
+
+def _outline(shape: FittedShape) -> FittedShape:
+    """A prism's outline; of other shapes themselves."""
+    return shape.outline if isinstance(shape, Prism) else shape
 
 
 def _walls(contact_map: ContactMap) -> ContactMap:

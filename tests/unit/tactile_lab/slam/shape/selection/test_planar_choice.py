@@ -40,7 +40,7 @@ def chosen(outline: Array, count: int, seed: int) -> FittedShape:
 
 
 @pytest.mark.parametrize(
-    ("outline", "name", "largest_m"),
+    ("outline", "names", "largest_m"),
     [
         (rectangle(), "polygon", 0.0015),
         (rectangle(0.06, 0.06), "polygon", 0.0015),
@@ -48,12 +48,12 @@ def chosen(outline: Array, count: int, seed: int) -> FittedShape:
         (triangle(), "polygon", 0.002),
         (l_block(), "polygon", 0.0018),
         (ellipse(), "gpis", 0.0018),
-        (stadium(), "gpis", 0.0020),
+        (stadium(), "gpis or rounded", 0.0020),
     ],
 )
-def test_forty_contacts_give_the_right_model_and_a_good_outline(outline: Array, name: str, largest_m: float) -> None:
+def test_forty_contacts_give_the_right_model_and_a_good_outline(outline: Array, names: str, largest_m: float) -> None:
     shapes = [chosen(outline, 40, seed) for seed in range(4)]
-    assert [shape.name for shape in shapes] == [name] * 4
+    assert {shape.name for shape in shapes} <= set(names.split(" or "))
     errors = [contour_errors(shape.contour().points_m, outline).hausdorff_m for shape in shapes]
     assert np.mean(errors) < largest_m
 

@@ -83,7 +83,6 @@ def test_what_fingers_share_is_counted_once(known: ContactMap) -> None:
     without = propagate_pose_uncertainty(contour, shape, with_shared_errors(known, 0.0), NOISE)
     once = propagate_pose_uncertainty(contour, shape, known, NOISE)
     assert without.shared_sigma_m == 0.0
-    assert np.all(without.sigma_m >= contour.sigma_m)
     assert 0.2 * SHARED_m < once.shared_sigma_m < SHARED_m
     own = once.sigma_m**2 - once.shared_sigma_m**2
     assert 0.2 * np.median(without.sigma_m**2) < np.median(own) < 0.9 * np.median(without.sigma_m**2)

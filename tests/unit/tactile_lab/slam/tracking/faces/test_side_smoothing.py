@@ -1,0 +1,81 @@
+"""Poses and straight and round sides smoothed together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tactile_lab.experiments.data import planar_data
+from tactile_lab.slam.shape.fields.settings import GpisSettings
+from tactile_lab.slam.shape.selection.planar_choice import rounded_of
+from tactile_lab.slam.shape.surfaces.surface import extract_contour
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
+from tactile_lab.slam.tracking.faces.side_smoothing import SideSmoother, smoothed_with_sides
+from tests.support.shape_examples import half_disc
+from tests.support.simulated_contacts import placed_truly, true_map
+
+NOISE = MotionNoise()
+
+
+def half_discs(count: int, settings: GpisSettings | None = None) -> ContactMap:
+    return placed_truly(planar_data.simulate_outline("half disc", half_disc(), 3, 1.0, count), 2, settings)
+
+
+def shaken(contact_map: ContactMap) -> ContactMap:
+    shake = np.random.default_rng(0).normal(size=contact_map.rows.shape) * [0.002, 0.002, 0.03]
+    shake[0] = 0.0
+    return contact_map.with_rows(np.asarray(contact_map.rows + shake))
+
+
+def value(contact_map: ContactMap) -> float:
+    fitted = contact_map.fit()
+    evidence = rounded_of(fitted, extract_contour(fitted)).log_evidence
+    return evidence - MotionCost.of(contact_map, NOISE).value(contact_map.rows)
+
+
+def test_shaken_poses_settle_on_the_sides() -> None:
+    contact_map = shaken(half_discs(12))
+    found = smoothed_with_sides(contact_map, NOISE)
+    assert found is not None
+    assert value(found) > value(contact_map) + 5
+    assert np.array_equal(found.rows[0], contact_map.rows[0])
+    outline = rounded_of(found.fit(), extract_contour(found.fit()))
+    assert any(side.is_round and side.radius_m == pytest.approx(0.035, abs=0.003) for side in outline.sides)
+
+
+def test_outlines_without_a_round_side_are_left_to_the_faces() -> None:
+    assert smoothed_with_sides(true_map("rectangle"), NOISE) is None
+    assert smoothed_with_sides(half_discs(12, GpisSettings(without=frozenset({"round sides"}))), NOISE) is None
+
+
+def test_the_derivatives_are_those_of_the_residuals() -> None:
+    contact_map = shaken(half_discs(5))
+    outline = rounded_of(contact_map.fit(), extract_contour(contact_map.fit()))
+    smoother = SideSmoother(contact_map, NOISE, outline)
+    at = smoother.start
+    jacobian, step = smoother.jacobian(at), 1e-7
+    for unknown in range(jacobian.shape[1]):
+        change = np.zeros(jacobian.shape[1])
+        change[unknown] = step
+        moved = smoother.moved(at, change)
+        numeric = (smoother.residuals(moved) - smoother.residuals(at)) / step
+        assert np.allclose(jacobian[:, unknown], numeric, rtol=1e-4, atol=1e-4 * np.abs(numeric).max())
+
+
+def test_a_grasp_that_touches_the_round_side_alone_may_be_turned_about_its_centre() -> None:
+    contact_map = half_discs(14)
+    outline = rounded_of(contact_map.fit(), extract_contour(contact_map.fit()))
+    certainty = SideCertainty.of(contact_map, NOISE, outline)
+    turns_rad = np.sqrt(np.diag(np.linalg.inv(certainty.information_of_poses)))[2::3]
+    is_round = [side.is_round for side in outline.sides]
+    owner = np.empty(len(contact_map.contacts), dtype=int)
+    for index, side in enumerate(outline.sides):
+        owner[side.members] = index
+    touched = [owner[contact_map.grasp_indices == grasp] for grasp in range(1, 14)]
+    alone = np.array([all(is_round[side] for side in sides) for sides in touched])
+    assert alone.any()
+    assert (~alone).any()
+    assert turns_rad[alone].min() > 2 * np.median(turns_rad[~alone])
