@@ -25,6 +25,10 @@ LEAST_ON_ARC = 4
 _SHARPEST_m = 0.004
 """Radius of the most curved side; of a fingertip's size nothing more can be told."""
 
+_PRIOR_m2 = (2 * _SHARPEST_m) ** 2
+"""Information about a side's curvature before any contact: none is sharper. It decides where all contacts of a run are
+at one place."""
+
 _TYPICAL_LENGTH_m = 0.030
 """Over which the normals of two contacts tell a side's curvature."""
 
@@ -152,6 +156,7 @@ class _Runs:
         matrices, right, constants = (
             _between(each, begin, end) for each in (self._matrices, self._right, self._constants)
         )
+        matrices[:, 0, 0] += _PRIOR_m2
         numbers = _solve(matrices, right, is_round=is_round)
         misfit = np.maximum(constants - np.einsum("ri,ri->r", right, numbers), 0.0)
         costs = np.full((count, count), np.inf)
@@ -162,6 +167,7 @@ class _Runs:
     def side(self, begin: int, end: int, *, is_round: bool) -> Side:
         """The best side of the contacts from ``begin`` up to ``end``, without that."""
         matrix, right = self._matrices[begin:end].sum(axis=0), self._right[begin:end].sum(axis=0)
+        matrix[0, 0] += _PRIOR_m2
         numbers = _solve(matrix[None], right[None], is_round=is_round)[0]
         covariance = np.zeros((4, 4))
         free = slice(0, 4) if is_round else _DIRECTION
