@@ -160,8 +160,7 @@ class _Runs:
         numbers = _solve(matrices, right, is_round=is_round)
         misfit = np.maximum(constants - np.einsum("ri,ri->r", right, numbers), 0.0)
         costs = np.full((count, count), np.inf)
-        too_sharp = np.abs(numbers[:, 0]) > 1 / (2 * _SHARPEST_m)
-        costs[begin, end] = np.where(too_sharp, np.inf, misfit)
+        costs[begin, end] = np.where(_is_a_circle(numbers), misfit, np.inf) if is_round else misfit
         return costs
 
     def side(self, begin: int, end: int, *, is_round: bool) -> Side:
@@ -182,6 +181,14 @@ def _solve(matrices: Array, right: Array, *, is_round: bool) -> Array:
     free = slice(0, 4) if is_round else _DIRECTION
     numbers[:, free] = np.linalg.solve(matrices[:, free, free], right[:, free, None])[..., 0]
     return numbers
+
+
+def _is_a_circle(numbers: Array) -> NDArray[np.bool_]:
+    """Whether sides, shape (r, 4), have a radius, one not below the smallest, and the scale that a side has."""
+    squared_slope = np.sum(numbers[:, 1:3] ** 2, axis=1) - 4 * numbers[:, 0] * numbers[:, 3]
+    return np.asarray(
+        (np.abs(numbers[:, 0]) < 1 / (2 * _SHARPEST_m)) & (numbers[:, 0] != 0.0) & (np.abs(squared_slope - 1) < 0.5)
+    )
 
 
 def _between(each: Array, begin: Indices, end: Indices) -> Array:

@@ -103,6 +103,23 @@ def test_exact_contacts_on_an_arc_give_its_circle(
     assert np.allclose(side.values_m(points + 1e-5 * normals), 1e-5, atol=1e-6)
 
 
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 10**6), count=st.integers(3, 24), spread_m=st.sampled_from([0.0, 1e-4, 0.01, 0.05]))
+def test_contacts_anywhere_give_a_finite_outline_or_none(seed: int, count: int, spread_m: float) -> None:
+    rng = np.random.default_rng(seed)
+    normals = rng.normal(size=(count, 2))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    contacts = PlanarContacts.of(spread_m * rng.normal(size=(count, 2)), normals, POINT_SIGMA_m, NORMAL_SIGMA_rad)
+    try:
+        found = RoundedOutline.of(contacts, rectangle())
+    except ShapeError:
+        return
+    contour = found.contour()
+    assert np.isfinite(contour.points_m).all()
+    assert np.isfinite(contour.sigma_m).all()
+    assert np.isfinite(found.log_evidence)
+
+
 def test_the_stated_sigma_holds_the_errors_of_a_round_side() -> None:
     inside = []
     for seed in range(40):
