@@ -10,7 +10,7 @@ from drivers.core.contacts import Array
 from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
-from tactile_lab.slam.tracking.faces.side_smoothing import SideSmoother
+from tactile_lab.slam.tracking.faces.side_smoothing import SideSmoother, rounded_outline
 
 
 class SideCertainty:
@@ -28,8 +28,9 @@ class SideCertainty:
         self._by_contacts = smoother.response(shared.displacements_each_m())[free:]
 
     @classmethod
-    def of(cls, contact_map: ContactMap, noise: MotionNoise, outline: RoundedOutline) -> Self:
-        """From poses of largest evidence and the outline of their contacts."""
+    def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
+        """From poses of largest evidence, contacts in the plane. Raises ShapeError where no side is round."""
+        outline = rounded_outline(contact_map)
         return cls(contact_map, SideSmoother(contact_map, noise, outline), outline)
 
     def surface_change(self, places_m: Array, normals: Array) -> Array:

@@ -29,6 +29,12 @@ _ROUNDS, _STEPS = 4, 15
 _SETTLED_nats = 0.5
 
 
+def rounded_outline(contact_map: ContactMap) -> RoundedOutline:
+    """The straight and round sides of a map's contacts in the plane, in the map's order. Raises ShapeError."""
+    fitted = contact_map.fit()
+    return rounded_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+
+
 def smoothed_with_sides(contact_map: ContactMap, noise: MotionNoise) -> ContactMap | None:
     """Divide a map's contacts into sides, and let poses, sides and the division settle; None if no side is round."""
     if "round sides" in contact_map.settings.without:
@@ -37,8 +43,7 @@ def smoothed_with_sides(contact_map: ContactMap, noise: MotionNoise) -> ContactM
     motion = MotionCost.of(contact_map, noise)
     for _ in range(_ROUNDS):
         try:
-            fitted = contact_map.fit()
-            outline = rounded_of(fitted, extract_contour(fitted, resolution_m=_ORDERING_RESOLUTION_m))
+            outline = rounded_outline(contact_map)
         except ShapeError:  # nothing enclosed, or only flat faces
             break
         value = outline.log_evidence - motion.value(contact_map.rows)
@@ -65,7 +70,13 @@ class SidedTrajectory:
 
 
 class SideSmoother:
-    """Least squares over the poses of a map and the sides of its contacts."""
+    """Least squares over the poses of a map and the sides of its contacts.
+
+    Args:
+        contact_map: the poses and contacts.
+        noise: of the motion model.
+        outline: of these contacts, in their order.
+    """
 
     def __init__(self, contact_map: ContactMap, noise: MotionNoise, outline: RoundedOutline) -> None:
         self._space, self._rows = contact_map.space, contact_map.rows

@@ -72,7 +72,7 @@ def _certainty(contact_map: ContactMap, noise: MotionNoise) -> FacetCertainty | 
     """Of flat faces, or of straight and round sides where these are likelier. Raises ShapeError, LinAlgError."""
     shape = best_shape(contact_map.fit(), contact_map.free_points_m) if contact_map.dimension == 2 else None
     if isinstance(shape, RoundedOutline):
-        return SideCertainty.of(contact_map, noise, shape)
+        return SideCertainty.of(contact_map, noise)
     return FacetCertainty.of(contact_map, noise)
 
 

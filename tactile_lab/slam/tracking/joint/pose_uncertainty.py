@@ -177,10 +177,9 @@ def _certainty(
     contact_map: ContactMap, noise: MotionNoise, shape: FittedShape
 ) -> FacetCertainty | SideCertainty | None:
     """Of the outline's sides where some are round, otherwise of flat faces; None if these enclose nothing."""
-    outline = _outline(shape)
     try:
-        if isinstance(outline, RoundedOutline):
-            return SideCertainty.of(contact_map, noise, outline)
+        if isinstance(_outline(shape), RoundedOutline):
+            return SideCertainty.of(contact_map, noise)
         return FacetCertainty.of(contact_map, noise)
     except (ShapeError, np.linalg.LinAlgError):  # the contacts enclose nothing without the rest
         return None

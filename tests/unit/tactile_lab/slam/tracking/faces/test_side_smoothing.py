@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_lab.experiments.data import planar_data
+from tactile_lab.experiments.data import planar_data, second_family
 from tactile_lab.slam.shape.fields.settings import GpisSettings
-from tactile_lab.slam.shape.selection.planar_choice import rounded_of
-from tactile_lab.slam.shape.surfaces.surface import extract_contour
+from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
+from tactile_lab.slam.shape.selection.planar_choice import best_shape
+from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
-from tactile_lab.slam.tracking.faces.side_smoothing import SideSmoother, smoothed_with_sides
+from tactile_lab.slam.tracking.faces.side_smoothing import SideSmoother, rounded_outline, smoothed_with_sides
+from tactile_lab.slam.tracking.joint.pose_uncertainty import propagate_pose_uncertainty
 from tests.support.shape_examples import half_disc
 from tests.support.simulated_contacts import placed_truly, true_map
 
@@ -31,9 +33,7 @@ def shaken(contact_map: ContactMap) -> ContactMap:
 
 
 def value(contact_map: ContactMap) -> float:
-    fitted = contact_map.fit()
-    evidence = rounded_of(fitted, extract_contour(fitted)).log_evidence
-    return evidence - MotionCost.of(contact_map, NOISE).value(contact_map.rows)
+    return rounded_outline(contact_map).log_evidence - MotionCost.of(contact_map, NOISE).value(contact_map.rows)
 
 
 def test_shaken_poses_settle_on_the_sides() -> None:
@@ -42,7 +42,7 @@ def test_shaken_poses_settle_on_the_sides() -> None:
     assert found is not None
     assert value(found) > value(contact_map) + 5
     assert np.array_equal(found.rows[0], contact_map.rows[0])
-    outline = rounded_of(found.fit(), extract_contour(found.fit()))
+    outline = rounded_outline(found)
     assert any(side.is_round and side.radius_m == pytest.approx(0.035, abs=0.003) for side in outline.sides)
 
 
@@ -53,7 +53,7 @@ def test_outlines_without_a_round_side_are_left_to_the_faces() -> None:
 
 def test_the_derivatives_are_those_of_the_residuals() -> None:
     contact_map = shaken(half_discs(5))
-    outline = rounded_of(contact_map.fit(), extract_contour(contact_map.fit()))
+    outline = rounded_outline(contact_map)
     smoother = SideSmoother(contact_map, NOISE, outline)
     at = smoother.start
     jacobian, step = smoother.jacobian(at), 1e-7
@@ -67,8 +67,8 @@ def test_the_derivatives_are_those_of_the_residuals() -> None:
 
 def test_a_grasp_that_touches_the_round_side_alone_may_be_turned_about_its_centre() -> None:
     contact_map = half_discs(14)
-    outline = rounded_of(contact_map.fit(), extract_contour(contact_map.fit()))
-    certainty = SideCertainty.of(contact_map, NOISE, outline)
+    outline = rounded_outline(contact_map)
+    certainty = SideCertainty.of(contact_map, NOISE)
     turns_rad = np.sqrt(np.diag(np.linalg.inv(certainty.information_of_poses)))[2::3]
     is_round = [side.is_round for side in outline.sides]
     owner = np.empty(len(contact_map.contacts), dtype=int)
@@ -79,3 +79,16 @@ def test_a_grasp_that_touches_the_round_side_alone_may_be_turned_about_its_centr
     assert alone.any()
     assert (~alone).any()
     assert turns_rad[alone].min() > 2 * np.median(turns_rad[~alone])
+
+
+def test_a_prism_over_a_half_disc_states_what_poses_and_sides_leave_open() -> None:
+    data = second_family.simulate("half-cylinder", 4, dimension=3, count=12)
+    contact_map = placed_truly(data, 3)
+    fewer = contact_map.without_contact(0, 0)  # a shape may leave out contacts that fit nothing
+    shape = best_shape(fewer.fit(), floor_m=0.0)
+    assert isinstance(shape, Prism)
+    assert isinstance(shape.outline, RoundedOutline)
+    mesh = shape.mesh(0.006, 0.0)
+    stated = propagate_pose_uncertainty(mesh, shape, contact_map, NOISE)
+    assert np.isfinite(stated.sigma_m).all()
+    assert np.median(stated.sigma_m) > 0
