@@ -41,3 +41,13 @@ def posed_path(name: str) -> tuple[Path, str]:
     found = _POSED.match(name)
     path = Path((found["path"] if found else name).removeprefix(MESH_PREFIX))
     return path, found["pose"] if found else STANDING
+
+
+def headline(name: str) -> str:
+    """An object as people call it: of a mesh the file's name without suffix, and its pose where the name says one."""
+    if not name.startswith(MESH_PREFIX):
+        return name
+    path, pose = posed_path(name)
+    if not _POSED.match(name):
+        return path.stem
+    return f"{path.stem}, {f'pose {pose}' if pose.isdigit() else pose}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import PurePath
 
 from drivers.core.errors import ConfigurationError
 
@@ -35,15 +34,6 @@ def slug(text: str) -> str:
     """Convert a name to part of an id; of a path (``mesh:some/part.stl``) the file name without suffix."""
     last = re.split(r"[/\\:]", text.strip())[-1]
     return re.sub(r"[^a-z0-9]+", "-", re.sub(r"\.[a-z0-9]+$", "", last.lower())).strip("-") or "unnamed"
-
-
-def headline(object_name: str) -> str:
-    """An object as people call it: of a mesh (``mesh:some/part.stl@lying``) the file's name and its pose."""
-    if not object_name.startswith("mesh:"):
-        return object_name
-    path, _, pose = object_name.removeprefix("mesh:").partition("@")
-    name = PurePath(path).stem
-    return f"{name}, {f'pose {pose}' if pose.isdigit() else pose}" if pose else name
 
 
 def recovered_id(name: str) -> str:

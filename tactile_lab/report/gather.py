@@ -11,9 +11,9 @@ from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
 from drivers.core.poses import spatial, transform_points
+from drivers.simulation.object_names import headline
 from sessions.recording.manifest import Manifest
 from sessions.recording.session import Session
-from sessions.recording.session_ids import headline
 from tactile_lab.evaluation.estimate_with_truth import Truth, true_outline
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.plain import read_json_object

@@ -120,9 +120,7 @@ def sharp_outlines(gpis: Gpis, provisional: Contour) -> list[SharpOutline]:
 
 def rounded_of(gpis: Gpis, provisional: Contour) -> RoundedOutline:
     """The straight and round sides of a planar field's contacts, whatever their evidence. Raises ShapeError."""
-    seen = gpis.observations
-    contacts = PlanarContacts.of(gpis.contacts_m, gpis.normals, seen.value_sigma_m, seen.gradient_sigma)
-    return RoundedOutline.of(contacts, provisional.points_m)
+    return RoundedOutline.of(_contacts(gpis), provisional.points_m)
 
 
 def polygon_of(gpis: Gpis, provisional: Contour) -> Polygon:
@@ -134,8 +132,7 @@ def outline_of(gpis: Gpis, provisional: Contour) -> tuple[Polygon, NDArray[np.bo
     """As :func:`polygon_of`; also returns which of the field's contacts lie at its corners, shape (n,). Raises
     ShapeError.
     """
-    seen = gpis.observations
-    contacts = PlanarContacts.of(gpis.contacts_m, gpis.normals, seen.value_sigma_m, seen.gradient_sigma)
+    contacts = _contacts(gpis)
     faces = segment(contacts, provisional.points_m)
     leaning = at_corners(contacts, faces)
     if "corners" in gpis.settings.without:
@@ -151,6 +148,11 @@ def outline_of(gpis: Gpis, provisional: Contour) -> tuple[Polygon, NDArray[np.bo
     if cornered is not None and cornered.log_evidence > plain.log_evidence:
         return cornered, leaning
     return plain, np.zeros_like(leaning)
+
+
+def _contacts(gpis: Gpis) -> PlanarContacts:
+    seen = gpis.observations
+    return PlanarContacts.of(gpis.contacts_m, gpis.normals, seen.value_sigma_m, seen.gradient_sigma)
 
 
 def _corner(

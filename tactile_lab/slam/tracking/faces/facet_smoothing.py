@@ -19,6 +19,7 @@ from tactile_lab.slam.shape.planar.segmentation import price_of_face
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.damped_steps import descend
 from tactile_lab.slam.tracking.faces.face_extents import overhang
 from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, Neighbours, flat_faces, tangents
 from tactile_lab.slam.tracking.faces.joint_weights import JointWeights
@@ -27,8 +28,6 @@ from tactile_lab.slam.tracking.faces.solid_face_extents import SolidFaceExtents
 _MOST_PLANES_SHARE = 0.25
 """Solids whose planes have less than four contacts each on average are not faceted."""
 
-_FIRST_DAMPING = 1e-3
-_LARGEST_DAMPING = 1e6
 _LARGEST_FOLD = float(np.cos(np.deg2rad(35.0)))
 """Faces that meet at a larger angle are never merged."""
 
@@ -86,20 +85,7 @@ class FacetSmoother:
             faces: to start from.
             iterations: at most.
         """
-        best, damping = self._rate(rows, faces), _FIRST_DAMPING
-        for _ in range(iterations):
-            information, gradient = self._normal_equations(best)
-            before = best.cost
-            while damping < _LARGEST_DAMPING:
-                damped = information + damping * np.diag(np.diag(information))
-                candidate = self._step(best, np.asarray(-np.linalg.solve(damped, gradient)))
-                if candidate.cost < best.cost:
-                    best, damping = candidate, max(damping / 8, 1e-9)
-                    break
-                damping *= 5
-            if before - best.cost < 1e-3:
-                break
-        return best
+        return descend(self._rate(rows, faces), self._normal_equations, self._step, iterations)
 
     def simplify(self, rows: Array, faces: FlatFaces, price: float, neighbours: Neighbours) -> FacetedTrajectory:
         """Merge neighbouring faces as long as that costs less than the price of a face, while the poses adapt.

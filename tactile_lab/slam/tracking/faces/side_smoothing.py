@@ -21,10 +21,10 @@ from tactile_lab.slam.shape.surfaces.surface import extract_contour
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.damped_steps import descend
 from tactile_lab.slam.tracking.faces.joint_weights import JointWeights
 
 _ORDERING_RESOLUTION_m = 0.002
-_FIRST_DAMPING, _LARGEST_DAMPING = 1e-3, 1e6
 _ROUNDS, _STEPS = 4, 15
 _SETTLED_nats = 0.5
 
@@ -97,20 +97,7 @@ class SideSmoother:
 
     def fit(self) -> Array:
         """The best poses near the map's, contacts keeping their sides (Levenberg-Marquardt), shape (k, 3)."""
-        best, damping = self.start, _FIRST_DAMPING
-        for _ in range(_STEPS):
-            information, gradient = self._normal_equations(best)
-            before = best.cost
-            while damping < _LARGEST_DAMPING:
-                damped = information + damping * np.diag(np.diag(information))
-                candidate = self.moved(best, np.asarray(-np.linalg.solve(damped, gradient)))
-                if candidate.cost < best.cost:
-                    best, damping = candidate, max(damping / 8, 1e-9)
-                    break
-                damping *= 5
-            if before - best.cost < 1e-3:
-                break
-        return best.rows
+        return descend(self.start, self._normal_equations, self.moved, _STEPS).rows
 
     def information(self) -> Array:
         """Gauss-Newton information at the map's poses, by all poses but the first, then by each side's free numbers."""

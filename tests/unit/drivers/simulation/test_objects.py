@@ -10,7 +10,7 @@ import trimesh
 from scipy.spatial import ConvexHull
 
 from drivers.core.errors import ConfigurationError
-from drivers.simulation.object_names import in_pose
+from drivers.simulation.object_names import headline, in_pose
 from drivers.simulation.objects import CATALOGUE, QUIET_ZONE, Hull, ObjectModel, Solid, object_model
 
 NAMES = tuple(CATALOGUE)
@@ -213,3 +213,17 @@ def test_an_open_surface_is_refused_with_what_is_open(tmp_path: Path) -> None:
     mesh.export(tmp_path / "bowl.ply")
     with pytest.raises(ConfigurationError, match="edges are open"):
         object_model(f"mesh:{tmp_path / 'bowl.ply'}")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("l-block", "l-block"),
+        ("mesh:/data/soup can.ply", "soup can"),
+        ("mesh:cups/mug.v2.stl@lying", "mug.v2, lying"),
+        ("mesh:mug.stl@3", "mug, pose 3"),
+        ("mesh:/home/me@lab/cup.stl", "cup"),
+    ],
+)
+def test_meshes_are_called_by_their_files_name(name: str, said: str) -> None:
+    assert headline(name) == said
