@@ -2,7 +2,8 @@
 
 An estimator that was tuned on one generator may state uncertainties that hold for that generator only. Here fingers
 come from evenly spread directions towards points inside the object; the errors of contacts have heavy tails, are partly
-common to a grasp (an error of the palm's pose) and partly to a session (the sensors' bias); slips have heavy tails.
+common to a grasp (an error of the palm's pose) and partly to a session (the sensors' bias, drawn once); slips have
+heavy tails.
 Their standard deviations are those that contacts and settings state: 1 mm (of which the palm has a part), 5 degrees,
 10 mm and 20 degrees.
 """
@@ -28,10 +29,10 @@ _COMMON_SHARE = 0.3
 OWN_SIGMA_m, PALM_SIGMA_m = POINT_SIGMA_m * np.sqrt([1.0 - _COMMON_SHARE, _COMMON_SHARE])
 """What contacts state, and what is stated of the palm: that all contacts of a grasp have in common."""
 
-_BIAS_m = 0.0002
-"""How much deeper all contacts of a session lie than the surface."""
+_BIAS_SIGMA_m = 0.0002
+"""Standard deviation of how much deeper or higher than the surface all contacts of a session lie."""
 
-_BIAS_COVARIANCE_m2 = _BIAS_m**2 * np.eye(3)
+_BIAS_COVARIANCE_m2 = _BIAS_SIGMA_m**2 * np.eye(3)
 """What contacts state of it: what all touches of all fingers share, as after a calibration that is good to so much."""
 
 _CONTACT_FREEDOM, _SLIP_FREEDOM = 4.0, 6.0
@@ -148,7 +149,9 @@ def simulate(
     Raises:
         ConfigurationError: there is no such shape.
     """
-    hand = _Hand(body(shape), np.random.default_rng([seed, 77003]), dimension, wrong_share)
+    found = body(shape)
+    bias_m = _BIAS_SIGMA_m * float(np.random.default_rng([seed, 77003, SHAPES.index(shape), dimension]).normal())
+    hand = _Hand(found, np.random.default_rng([seed, 77003]), dimension, wrong_share, bias_m)
     grasps, truth = [], []
     for index in range(count):
         motion = hand.move() if index else Pose3()
@@ -166,10 +169,11 @@ class _Hand:
         rng: source of all random numbers.
         dimension: 2 or 3, see :func:`simulate`.
         wrong_share: of the contacts.
+        bias_m: how far outside of the surface its fingers feel all contacts.
     """
 
-    def __init__(self, body: Body, rng: np.random.Generator, dimension: int, wrong_share: float) -> None:
-        self.body, self._rng, self._wrong_share = body, rng, wrong_share
+    def __init__(self, body: Body, rng: np.random.Generator, dimension: int, wrong_share: float, bias_m: float) -> None:
+        self.body, self._rng, self._wrong_share, self._bias_m = body, rng, wrong_share, bias_m
         self._noisy = np.array([1.0, 1.0, float(dimension == 3)])
         self.world_T_body = _on_table(rng.normal(0.0, 0.04, 2), rng.uniform(-np.pi, np.pi))
 
@@ -219,7 +223,7 @@ class _Hand:
             return None
         point, normal = np.asarray(pose.transformFrom(found[0])), np.asarray(pose.rotation().rotate(found[1]))
         own_m = OWN_SIGMA_m * self._heavy(_CONTACT_FREEDOM, 3)
-        point = point - _BIAS_m * normal + common_m + self._noisy * own_m
+        point = point + self._bias_m * normal + common_m + self._noisy * own_m
         normal = normal + self._noisy * NORMAL_SIGMA_rad * self._heavy(_CONTACT_FREEDOM, 3)
         if rng.random() < self._wrong_share:
             point, normal = point + self._noisy * rng.normal(0.0, _WRONG_m, 3), self._noisy * rng.normal(size=3)

@@ -57,12 +57,14 @@ class KnownPart:
     """The touched part of a shape.
 
     Attributes:
-        known: of each point of the outline or vertex of the surface, whether it was touched nearby, shape (n,).
+        near: of each point of the outline or vertex of the surface, whether it was touched nearby, shape (n,).
+        known: whether it is certain besides, shape (n,).
         share: of the outline's length or the surface's area, 0 to 1.
         distances_m: from each point to the nearest contact on a side that faces the same way, at most
             :data:`REACH_m`, shape (n,).
     """
 
+    near: Mask
     known: Mask
     share: float
     distances_m: Array
@@ -89,24 +91,27 @@ def known_part(
     sides = _outline(shape) if isinstance(shape, Contour) else _surface(shape)
     points, normals = sides.points_m, sides.normals
     distances = _nearest_alike(sides, contacts)
-    known = shape.sigma_m <= LARGEST_SIGMA_m
     if isinstance(shape, SurfaceMesh):
-        known &= (distances < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
-        if floor_m is not None:
-            known |= (points[:, 2] < floor_m + LEVEL_SIGMA_m) & (normals[:, 2] < _DOWN)
+        near = (distances < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
     else:
-        known &= distances < reach_m
+        near = distances < reach_m
+    known = near & (shape.sigma_m <= LARGEST_SIGMA_m)
+    if isinstance(shape, SurfaceMesh) and floor_m is not None:
+        foot = (points[:, 2] < floor_m + LEVEL_SIGMA_m) & (normals[:, 2] < _DOWN)
+        known, near = known | foot, near | foot
     share = float(sides.sizes @ known / max(float(sides.sizes.sum()), 1e-12))
-    return KnownPart(known, min(share, 1.0), distances)
+    return KnownPart(near, known, min(share, 1.0), distances)
 
 
 def with_guesses_told(shape: _Shape, part: KnownPart) -> _Shape:
-    """The shape with its known part, its standard deviation elsewhere no less than the distance to the nearest contact.
+    """The shape with its known part, its standard deviation where nothing near was touched no less than the distance to
+    the nearest contact.
 
-    A model's own standard deviation there holds only if the object is what the model expects.
+    A model's own standard deviation there holds only if the object is what the model expects. Near contacts it stands,
+    also where it is large: what may be hidden at a sharp corner is less than the way to the next contact.
     """
     guessed = np.maximum(part.distances_m, LARGEST_SIGMA_m)
-    sigma_m = np.where(part.known, shape.sigma_m, np.maximum(shape.sigma_m, guessed))
+    sigma_m = np.where(part.near, shape.sigma_m, np.maximum(shape.sigma_m, guessed))
     return replace(shape, sigma_m=sigma_m, known=part.known)
 
 

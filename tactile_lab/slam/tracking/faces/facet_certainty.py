@@ -13,6 +13,7 @@ import numpy as np
 from drivers.core.contacts import Array
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.faces.bends import Bends
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
 from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, flat_faces, tangents
 from tactile_lab.slam.tracking.faces.regular_faces import made_regular
@@ -46,15 +47,21 @@ class FacetCertainty:
     faces_by_contacts: Array
 
     @classmethod
-    def of(cls, contact_map: ContactMap, noise: MotionNoise) -> Self:
+    def of(cls, contact_map: ContactMap, noise: MotionNoise, bends: Bends | None = None) -> Self:
         """From poses of largest evidence, contacts in the plane or in space.
+
+        Args:
+            contact_map: contacts and poses.
+            noise: of the motion model.
+            bends: of a round object, whose faces stand in for a smooth surface and have no right angles.
 
         Raises:
             ShapeError: contacts in the plane whose faces enclose nothing.
         """
-        smoother, rows = FacetSmoother(contact_map, noise), contact_map.rows
+        smoother, rows = FacetSmoother(contact_map, noise, bends=bends), contact_map.rows
         faces, _ = flat_faces(contact_map)
-        faces = made_regular(contact_map, faces, smoother.information(rows, faces))
+        if bends is None:
+            faces = made_regular(contact_map, faces, smoother.information(rows, faces))
         information = smoother.information(rows, faces, given_errors=True)
         free = (len(rows) - 1) * contact_map.space.size
         by_poses = -np.linalg.solve(information[free:, free:], information[free:, :free])

@@ -19,6 +19,7 @@ from tactile_lab.slam.shape.planar.segmentation import price_of_face
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.bends import Bends
 from tactile_lab.slam.tracking.faces.damped_steps import descend
 from tactile_lab.slam.tracking.faces.face_extents import overhang
 from tactile_lab.slam.tracking.faces.flat_faces import FlatFaces, Neighbours, flat_faces, tangents
@@ -64,14 +65,22 @@ class FacetedTrajectory:
 class FacetSmoother:
     """Least squares over the poses of a map and the faces of its contacts."""
 
-    def __init__(self, contact_map: ContactMap, noise: MotionNoise, ends: SolidFaceExtents | None = None) -> None:
+    def __init__(
+        self,
+        contact_map: ContactMap,
+        noise: MotionNoise,
+        ends: SolidFaceExtents | None = None,
+        bends: Bends | None = None,
+    ) -> None:
         """
         Args:
             contact_map: the poses and contacts.
             noise: of the motion model.
             ends: where the faces of a solid end; None in the plane, and where no face is known to end.
+            bends: how a round surface turns at the contacts, which :meth:`information` then allows for; None if faces
+                are flat.
         """
-        self._space, self._ends = contact_map.space, ends
+        self._space, self._ends, self._bends = contact_map.space, ends, bends
         self._motion = MotionCost.of(contact_map, noise)
         self._world = contact_map.contacts_world
         self._grasp_of = contact_map.grasp_indices
@@ -210,7 +219,9 @@ class FacetSmoother:
         points, normals = self._seen(rows)
         count, dimension = points.shape
         contact, still, each = np.arange(count), np.zeros_like(normals), rows[self._grasp_of]
-        outward, along = faces.normals[faces.labels], tangents(faces.normals)[faces.labels]
+        along = tangents(faces.normals)[faces.labels]
+        outward = faces.normals[faces.labels] if self._bends is None else self._bends.normals
+        turning = np.zeros((count, dimension, dimension)) if self._bends is None else self._bends.turning
         blocks = 4 if dimension == 2 else dimension + 1
         by_poses = np.zeros((blocks * count, len(rows), self._space.size))
         by_faces = np.zeros((blocks * count, faces.count, dimension))
@@ -222,7 +233,7 @@ class FacetSmoother:
         for axis in range(dimension):
             unit = np.broadcast_to(np.eye(dimension)[axis], normals.shape)
             lines = (axis + 1) * count + contact
-            turned = self._space.by_row(each, points, normals, still, unit)
+            turned = self._space.by_row(each, points, normals, -turning[:, axis], unit)
             by_poses[lines, self._grasp_of] = turned * stiffness[:, None]
             by_faces[lines, faces.labels, :-1] = -along[:, axis] * stiffness[:, None]
         if dimension == 2:

@@ -1,7 +1,8 @@
 """Covariances of a finished trajectory's poses: in the object frame of the first grasp, and in the best common one.
 
 A smooth field with a long kernel states covariances that are too small. Flat faces whose places are estimated with the
-poses do not, not even of round objects, so they are used wherever contacts form any (decision 53).
+poses do not, so they are used wherever contacts form any (decision 53); in space those of round objects turn with the
+field's surface (decision 102).
 
 The object frame is born at the first grasp, whose pose is therefore given. An error of that grasp is an error of all
 other poses in the same direction; in the frame in which all grasps agree best it counts as one of many.
@@ -20,9 +21,12 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
+from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
+from tactile_lab.slam.tracking.faces.bends import Bends
 from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
 from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
 
@@ -73,7 +77,19 @@ def _certainty(contact_map: ContactMap, noise: MotionNoise) -> FacetCertainty | 
     shape = best_shape(contact_map.fit(), contact_map.free_points_m) if contact_map.dimension == 2 else None
     if isinstance(shape, RoundedOutline):
         return SideCertainty.of(contact_map, noise)
-    return FacetCertainty.of(contact_map, noise)
+    return FacetCertainty.of(contact_map, noise, Bends.of(contact_map) if _is_round(contact_map) else None)
+
+
+def _is_round(contact_map: ContactMap) -> bool:
+    """Whether a smooth field in space is likelier than a solid with flat faces."""
+    if contact_map.dimension == 2:
+        return False
+    field, upright = contact_map.fit(), contact_map.space is PLANAR
+    try:
+        solid = Polyhedron.fit(field, contact_map.free_points_m, upright=upright)
+    except ShapeError:  # too many planes
+        return True
+    return solid.log_evidence < field.log_marginal_likelihood()
 
 
 def _palm(contact_map: ContactMap, noise: MotionNoise) -> Array:

@@ -34,6 +34,28 @@ def test_contacts_are_on_the_outline_with_errors_of_the_stated_size_and_heavier_
     assert np.mean(found > 3.3) > 0.003  # a normal distribution has a thousandth
 
 
+def outside_m(shape: str, seed: int) -> float:
+    """How far outside of a convex outline the contacts of a session lie on average."""
+    data, found = simulate(shape, seed), []
+    start = data.body.outline_m
+    along = np.roll(start, -1, axis=0) - start
+    outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
+    for grasp, pose in zip(data.grasps, data.world_T_body, strict=True):
+        points = transform_points(pose.inverse(), grasp.points_world_m)[:, :2]
+        found.append(np.einsum("pkd,kd->pk", points[:, None] - start, outward).max(axis=1))
+    return float(np.concatenate(found).mean())
+
+
+def test_the_bias_of_a_session_is_drawn_as_its_contacts_state_it() -> None:
+    sessions = [("octagonal-prism", seed) for seed in range(24)] + [("tapered-cup", seed) for seed in range(24)]
+    found = np.array([outside_m(*session) for session in sessions])
+    shared = simulate("tapered-cup", 0, count=1).grasps[0].contacts[0].shared_covariance_m2
+    assert shared is not None
+    stated = np.sqrt(shared[0, 0])
+    assert abs(found.mean()) < 0.5 * stated
+    assert 0.8 * stated < found.std() < 1.7 * stated  # contacts scatter besides
+
+
 def test_solids_are_touched_at_all_heights_and_on_top() -> None:
     data = simulate("tapered-cup", 3, dimension=3, count=12)
     heights_m = np.concatenate([grasp.points_world_m[:, 2] for grasp in data.grasps])

@@ -61,6 +61,15 @@ def test_a_guess_is_marked_and_has_no_small_sigma() -> None:
     np.testing.assert_array_equal(told.sigma_m[told.known], 0.001)
 
 
+def test_what_is_uncertain_near_contacts_is_no_guess_farther_than_it_says() -> None:
+    unsure = outline(sigma_m=0.006)
+    part = known_part(unsure, touched(RIGHT))
+    told = with_guesses_told(unsure, part)
+    assert not part.known.any()
+    np.testing.assert_array_equal(told.sigma_m[part.near], 0.006)
+    assert told.sigma_m[~part.near].min() == REACH_m
+
+
 def test_simulated_grasps_all_around_know_the_whole_outline() -> None:
     ellipse = OUTLINES_m["ellipse"]
     normals = ellipse * [1.0, 25.0 / 9.0]
