@@ -21,10 +21,18 @@ from tactile_lab.evaluation.consistency.poses import birth_frame, common_frame, 
 from tactile_lab.evaluation.consistency.surfaces import SurfaceConsistency, mesh_consistency, outline_consistency
 from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.trajectory import Poses
-from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, outline_symmetry, stands, symmetry_turns
+from tactile_lab.evaluation.truth.rotational_symmetry import (
+    ORIGIN_m,
+    modulo_symmetry,
+    outline_symmetry,
+    round_axis_m,
+    stands,
+    symmetry_turns,
+)
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
+from tactile_lab.slam.doubt.symmetry import Symmetry
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
 from tactile_lab.slam.shape.metrics.metrics import ShapeErrors, contour_errors, mesh_errors
@@ -84,7 +92,7 @@ def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
         ("", stated, birth_frame(poses, truth)),
         ("common_", in_common, common_frame(poses, truth)),
     ):
-        judged = pose_consistency(poses, given, truth, frame)
+        judged = pose_consistency(poses, given, truth, frame, round_axis_m(_symmetry(data), truth))
         if judged is not None:
             figures |= {
                 f"{name}poses_inside": list(judged.inside),
@@ -102,10 +110,16 @@ def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> f
 
 
 def _modulo_symmetry(data: SimulatedGrasps, estimate: Poses) -> Poses:
-    if isinstance(data, SpatialGrasps):
-        return modulo_symmetry(estimate, data.world_T_body, symmetry_turns(data.mesh))
-    found = outline_symmetry(data.outline_m) if isinstance(data, PlanarGrasps) else None
+    found = _symmetry(data)
     return estimate if found is None else modulo_symmetry(estimate, data.world_T_body, found.order, found.centre_m)
+
+
+def _symmetry(data: SimulatedGrasps) -> Symmetry | None:
+    """Of the true surface or outline; None if its rotations can be distinguished."""
+    if isinstance(data, SpatialGrasps):
+        turns = symmetry_turns(data.mesh)
+        return None if turns is None else Symmetry(turns, ORIGIN_m)
+    return outline_symmetry(data.outline_m) if isinstance(data, PlanarGrasps) else None
 
 
 def _within(errors_m: Array, sigma_m: Array) -> float:

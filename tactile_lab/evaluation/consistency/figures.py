@@ -16,6 +16,7 @@ from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, true_o
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.evaluation.files.tables import read_contour
+from tactile_lab.evaluation.truth.rotational_symmetry import round_axis_m
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,9 @@ def consistency(estimate: EstimateWithTruth) -> ConsistencyFigures | None:
     truth = estimate.truth.world_T_object
     told, covariances = estimate.poses_modulo_symmetry, estimate.results.trajectory.covariances
     in_common = common_covariances(estimate.results) or covariances
-    born = PoseFigures.of(pose_consistency(told, covariances, truth, birth_frame(told, truth)))
-    common = PoseFigures.of(pose_consistency(told, in_common, truth, common_frame(told, truth)))
+    axis_m = round_axis_m(estimate.symmetry, truth)
+    born = PoseFigures.of(pose_consistency(told, covariances, truth, birth_frame(told, truth), axis_m))
+    common = PoseFigures.of(pose_consistency(told, in_common, truth, common_frame(told, truth), axis_m))
     surface = _surface(estimate)
     if born is None and common is None and surface is None:
         return None

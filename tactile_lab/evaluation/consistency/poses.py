@@ -2,7 +2,8 @@
 
 It follows chi square with as many degrees of freedom as a pose has estimated components. An estimate is compared with
 the truth in one object frame: where it was born, at the first grasp (:func:`birth_frame`), or the one that agrees best
-with all grasps (:func:`common_frame`), which does not count an error of the first grasp against all others.
+with all grasps (:func:`common_frame`), which does not count an error of the first grasp against all others. Of a round
+object only the place of its axis is judged: how it is turned no contact can tell, and no error of it is known.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ class PoseConsistency:
     Attributes:
         nees: normalised squared error of each judged pose, divided by its number of components: 1 on average if the
             covariances are true, above 1 if they are too small.
-        components: estimated components of a pose: 3 on a table, 6 in space.
+        components: estimated components of a pose: 3 on a table, 2 of a round object there, 6 in space.
         inside: share of the poses whose truth lies inside the stated region, for each of
             :data:`~tactile_lab.evaluation.consistency.levels.LEVELS`.
         log_score: mean log density of the true pose, metres and radians; higher is better.
@@ -45,7 +46,11 @@ class PoseConsistency:
 
 
 def pose_consistency(
-    estimate: Poses, covariances: Sequence[Array | None], truth: Poses, estimate_T_truth: Pose3 | None
+    estimate: Poses,
+    covariances: Sequence[Array | None],
+    truth: Poses,
+    estimate_T_truth: Pose3 | None,
+    axis_m: Array | None = None,
 ) -> PoseConsistency | None:
     """Judge the covariances of a trajectory, relative to an object frame in which estimate and truth are compared.
 
@@ -54,6 +59,7 @@ def pose_consistency(
         covariances: of each, shape (6, 6), see :class:`tactile_lab.evaluation.files.trajectory_file.Trajectory`.
         truth: true poses, in the truth's object frame.
         estimate_T_truth: the truth's object frame in the estimate's: :func:`birth_frame` or :func:`common_frame`.
+        axis_m: where the vertical axis of a round object is in the truth's object frame, shape (2,); None of others.
 
     Returns:
         None without such a frame, or if no grasp has a covariance and both poses.
@@ -63,7 +69,7 @@ def pose_consistency(
     judged = [
         scored
         for pair in compared_grasps(estimate, truth)
-        if (scored := _score(pair, covariances[pair.index], estimate_T_truth)) is not None
+        if (scored := _score(pair, covariances[pair.index], estimate_T_truth, axis_m)) is not None
     ]
     if not judged:
         return None
@@ -73,20 +79,38 @@ def pose_consistency(
     return PoseConsistency(tuple((nees / sizes).tolist()), int(sizes.max()), inside, float(densities.mean()))
 
 
-def _score(pair: Compared, covariance: Array | None, estimate_T_truth: Pose3) -> tuple[float, int, float] | None:
+def _score(
+    pair: Compared, covariance: Array | None, estimate_T_truth: Pose3, axis_m: Array | None
+) -> tuple[float, int, float] | None:
     """Squared normalised error, its number of components, and log density; None for a pose that was given."""
     if covariance is None:
         return None
+    truth = pair.truth * estimate_T_truth.inverse()
+    error = pose_deviation(pair.estimate, truth)
+    if axis_m is not None:
+        kept = _of_axis(pair.truth.transformFrom(np.append(axis_m, 0.0)) - truth.translation())
+        error, covariance = kept @ error, kept @ covariance @ kept.T
     known = np.flatnonzero(np.diag(covariance) > _LEAST_VARIANCE)
     if not len(known):
         return None
-    error = pose_deviation(pair.estimate, pair.truth * estimate_T_truth.inverse())[known]
-    stated = covariance[np.ix_(known, known)]
+    error, stated = error[known], covariance[np.ix_(known, known)]
     sign, log_determinant = np.linalg.slogdet(stated)
     if sign <= 0:
         return None
     squared = float(error @ np.linalg.solve(stated, error))
     return squared, len(known), -0.5 * (squared + float(log_determinant) + len(known) * float(np.log(2 * np.pi)))
+
+
+def _of_axis(arm_m: Array) -> Array:
+    """By a small motion in the world, that of a vertical axis, shape (5, 6): of a point on it, and its tilts.
+
+    Args:
+        arm_m: from the object's origin to that point, shape (3,).
+    """
+    kept = np.zeros((5, 6))
+    kept[:3, :3], kept[:3, 3:] = np.eye(3), np.cross(np.eye(3), arm_m).T
+    kept[3, 3] = kept[4, 4] = 1.0
+    return kept
 
 
 def birth_frame(estimate: Poses, truth: Poses) -> Pose3 | None:

@@ -84,6 +84,16 @@ def modulo_symmetry(
     return tuple(turned)
 
 
+def round_axis_m(symmetry: Symmetry | None, world_T_object: Poses) -> Array | None:
+    """Where the axis of a round object is in its own frame, shape (2,); None if it is not round, or does not always
+    stand upright.
+    """
+    known = [pose for pose in world_T_object if pose is not None]
+    if symmetry is None or symmetry.order != ANY_TURN or not all(map(stands, known)):
+        return None
+    return symmetry.centre_m
+
+
 def _nearest_turn(estimated: Rot3, true: Rot3, turns: int) -> Rot3:
     """The rotation equivalent to the estimated one that is nearest to the true one."""
     if turns == ANY_TURN:

@@ -14,6 +14,7 @@ from tactile_lab.evaluation.consistency.figures import PoseFigures, common_covar
 from tactile_lab.evaluation.consistency.levels import LEVELS
 from tactile_lab.evaluation.consistency.pose_covariance import covariance_in_world, pose_deviation
 from tactile_lab.evaluation.consistency.poses import birth_frame, common_frame, pose_consistency
+from tactile_lab.evaluation.truth.rotational_symmetry import ANY_TURN, modulo_symmetry
 
 OBJECT_FRAME = Pose3(Rot3.Rz(0.7), np.array([0.02, -0.01, 0.0]))
 """The truth's object frame in the estimate's."""
@@ -46,6 +47,21 @@ def test_true_covariances_hold_the_truth_as_often_as_they_say(frame: object) -> 
     assert found.components == 3
     assert found.inside == pytest.approx(LEVELS, abs=0.06)
     assert np.mean(found.nees) == pytest.approx(1.0, abs=0.1)
+
+
+def test_of_a_round_object_the_place_of_its_axis_is_judged_alone() -> None:
+    told, truth = drawn(1.0)
+    axis_m = np.array([0.015, -0.02])
+    told = list(modulo_symmetry(told, truth, ANY_TURN, axis_m))
+    stated = [covariance_in_world(pose, STATED) for pose in told if pose is not None]
+    frame = birth_frame(told, truth)
+    with_turns = pose_consistency(told, stated, truth, frame)
+    found = pose_consistency(told, stated, truth, frame, axis_m)
+    assert found is not None
+    assert with_turns is not None
+    assert found.components == 2
+    assert found.inside == pytest.approx(LEVELS, abs=0.06)
+    assert with_turns.inside[1] > 0.78  # the turn has no error by then, and is stated all the same
 
 
 def test_covariances_that_are_too_small_are_seen_and_score_lower() -> None:

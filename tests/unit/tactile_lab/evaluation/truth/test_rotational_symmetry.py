@@ -14,11 +14,13 @@ from tactile_lab.evaluation.truth.rotational_symmetry import (
     ANY_TURN,
     modulo_symmetry,
     outline_symmetry,
+    round_axis_m,
     symmetry_turns,
 )
 from tactile_lab.experiments.data.sensing import planar_pose
 from tactile_lab.experiments.data.solids import DATA_VARIABLE, solid
 from tactile_lab.experiments.data.spatial_data import simulate
+from tactile_lab.slam.doubt.symmetry import Symmetry
 
 
 @pytest.mark.parametrize(
@@ -89,6 +91,15 @@ def test_poses_that_are_not_known_or_do_not_stand_stay_as_they_are() -> None:
     turned = Pose3(Rot3.Rz(1.0), np.zeros(3))
     assert modulo_symmetry([None, turned], [turned, None], ANY_TURN) == (None, turned)
     assert modulo_symmetry([turned, turned], [lying, turned], ANY_TURN) == (turned, turned)
+
+
+def test_only_a_round_object_that_stands_has_an_axis_to_be_judged_by() -> None:
+    centre_m, stands, lies = np.array([0.01, 0.02]), Pose3(), Pose3(Rot3.Rx(0.5), np.zeros(3))
+    round_one = Symmetry(ANY_TURN, centre_m)
+    np.testing.assert_array_equal(round_axis_m(round_one, [None, stands]), centre_m)
+    assert round_axis_m(round_one, [stands, lies]) is None
+    assert round_axis_m(Symmetry(6, centre_m), [stands]) is None
+    assert round_axis_m(None, [stands]) is None
 
 
 def test_sixths_of_a_turn_of_an_outline_do_not_count_wherever_its_frame_is() -> None:
