@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from drivers.core.clock import NANOSECONDS
 from drivers.force.force_samples import WrenchSample
 from drivers.shadow.model.kinematics import JOINTS
 from sessions.perception.fingertip_samples import biotac_counts
 from sessions.perception.interpreter import BASE_LINK, CAMERA_LINK, HAND_LINK, Interpreter
 from sessions.recording.session_events import SessionEvent
-from sessions.recording.traffic import schemas
+from sessions.recording.traffic import schemas, told
 from sessions.recording.traffic.reader import TrafficMessage, TrafficReader
 from sessions.rig_runtime.state_recording import BASE_JOINTS
 
@@ -106,10 +105,10 @@ def _take_event(found: SampleTables, message: TrafficMessage) -> None:
 
 def _take_contacts(found: SampleTables, message: TrafficMessage) -> None:
     content = json.loads(message.data)
-    stamp_ns = content["timestamp"]["sec"] * NANOSECONDS + content["timestamp"]["nsec"]
-    for one in content["contacts"]:
-        row = (content["index"], one["finger"], *one["point_world_m"], *one["normal_world"], one["force_N"])
-        found.table("contacts", CONTACT_COLUMNS).add(stamp_ns, row)
+    index, touches = told.grasp(content)
+    for one in touches:
+        row = (index, one.finger, *one.point_world_m, *one.normal_world, one.force_N)
+        found.table("contacts", CONTACT_COLUMNS).add(told.stamp_ns(content), row)
 
 
 _OTHERS: Mapping[str, Any] = {

@@ -13,9 +13,10 @@ from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import CLOSINGS, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.recording.traffic import foxglove
+from sessions.recording.traffic.told import ToldSurface
 from tactile_lab.colours import SIGMA_FULL_m, viridis
 from tactile_lab.outline_walls import wall
-from tactile_lab.view.scene import Scene, ShownSurface, ellipse
+from tactile_lab.view.scene import Scene, ellipse
 from tactile_lab.view.skeleton import TIP_CENTRE_m, bones, shown_form
 
 TIP_RADIUS_m = 0.0085
@@ -219,7 +220,7 @@ def quaternion(pose: Pose3) -> Array:
     return np.array([rotation["w"], rotation["x"], rotation["y"], rotation["z"]])
 
 
-def patches(surface: ShownSurface) -> list[Patch]:
+def patches(surface: ToldSurface) -> list[Patch]:
     """The surface in parts of one colour each: dark where certain, yellow where uncertain.
 
     An outline is shown as a vertical wall from the table to twice the height of the contacts.

@@ -13,8 +13,9 @@ from gtsam import Pose3
 from drivers.camera.packet import picture_of
 from drivers.core.contacts import Array
 from sessions.perception.interpreter import CAMERA_LINK
-from sessions.recording.traffic import schemas
+from sessions.recording.traffic import schemas, told
 from sessions.recording.traffic.foxglove import pose_of
+from sessions.recording.traffic.told import ToldSurface
 from tactile_lab.view.course import ShownCourse
 
 PALM = "palm"
@@ -51,18 +52,6 @@ class ShownGrasp:
         return np.array([self.world_T_object.transformTo(point) for point in self.points_world_m]).reshape(-1, 3)
 
 
-@dataclass(frozen=True)
-class ShownSurface:
-    """The estimated surface in the object frame: vertices (n, 3), faces (m, 3), standard deviation (n,)."""
-
-    dimension: int
-    vertices_m: Array
-    faces: Any
-    sigma_m: Array
-    explored: float
-    origin_height_m: float
-
-
 @dataclass
 class Scene:
     """The newest state.
@@ -91,7 +80,7 @@ class Scene:
     grasps: list[ShownGrasp] = field(default_factory=list)
     world_T_object: Pose3 | None = None
     covariance: Array | None = None
-    surface: ShownSurface | None = None
+    surface: ToldSurface | None = None
     plan: dict[str, Any] = field(default_factory=dict)
     steps: dict[int, dict[str, Any]] = field(default_factory=dict)
     guide: dict[str, Any] = field(default_factory=dict)
@@ -154,28 +143,27 @@ def _loads(scene: Scene, content: dict[str, Any]) -> None:
 
 
 def _grasp(scene: Scene, content: dict[str, Any]) -> None:
-    contacts, index = content["contacts"], int(content["index"])
+    index, touches = told.grasp(content)
     shown = ShownGrasp(
         index=index,
-        fingers=tuple(contact["finger"] for contact in contacts),
-        points_world_m=np.array([contact["point_world_m"] for contact in contacts], dtype=float).reshape(-1, 3),
-        normals_world=np.array([contact["normal_world"] for contact in contacts], dtype=float).reshape(-1, 3),
-        forces_N=np.array([contact["force_N"] for contact in contacts], dtype=float),
+        fingers=tuple(touch.finger for touch in touches),
+        points_world_m=np.array([touch.point_world_m for touch in touches]).reshape(-1, 3),
+        normals_world=np.array([touch.normal_world for touch in touches]).reshape(-1, 3),
+        forces_N=np.array([touch.force_N for touch in touches]),
     )
     scene.grasps = [*(grasp for grasp in scene.grasps if grasp.index < index), shown]
     scene.changed.add("grasps")
 
 
 def _slam_pose(scene: Scene, content: dict[str, Any]) -> None:
-    scene.world_T_object = pose_of(content["pose"]["position"], content["pose"]["orientation"])
+    scene.world_T_object = told.pose(content)
     scene.changed.add("object")
 
 
 def _slam_state(scene: Scene, content: dict[str, Any]) -> None:
     """Process an estimate: the newest grasp was registered, or grasps were undone."""
     index = int(content["index"])
-    covariance = content.get("covariance")
-    scene.covariance = None if covariance is None else np.array(covariance, dtype=float)
+    scene.covariance = told.covariance(content)
     scene.course.take_pose(index, scene.covariance)
     scene.steps = {number: step for number, step in scene.steps.items() if number < index} | {index: content}
     placed = [_place(grasp, scene) if grasp.index == index else grasp for grasp in scene.grasps]
@@ -190,14 +178,7 @@ def _place(grasp: ShownGrasp, scene: Scene) -> ShownGrasp:
 
 
 def _surface(scene: Scene, content: dict[str, Any]) -> None:
-    scene.surface = ShownSurface(
-        dimension=int(content["dimension"]),
-        vertices_m=np.array(content["vertices_m"], dtype=float).reshape(-1, 3),
-        faces=np.array(content["faces"], dtype=int).reshape(-1, 3),
-        sigma_m=np.array(content["sigma_m"], dtype=float),
-        explored=float(content["explored"]),
-        origin_height_m=float(content["origin_height_m"]),
-    )
+    scene.surface = told.surface(content)
     scene.course.take_surface(scene.surface.sigma_m)
     scene.changed.add("object")
 

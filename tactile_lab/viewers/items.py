@@ -11,6 +11,7 @@ from gtsam import Pose3
 from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
+from sessions.recording.traffic.told import Touch
 from tactile_lab.colours import SIGMA_FULL_m, viridis
 from tactile_lab.viewers.robot import Placement
 
@@ -50,17 +51,6 @@ class SensorWrench:
     frame: str
     force_N: Array
     torque_Nm: Array
-
-
-@dataclass(frozen=True)
-class Touch:
-    """A contact of a grasp, world frame: point (3,), normal out of the object (3,), covariance (3, 3) in m^2."""
-
-    finger: str
-    point_world_m: Array
-    normal_world: Array
-    covariance_m2: Array
-    force_N: float
 
 
 @dataclass(frozen=True)

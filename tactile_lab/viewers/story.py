@@ -9,17 +9,14 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
 
 import numpy as np
 from gtsam import Pose3, Rot3
 
 from drivers.camera.frames import Detection
-from drivers.core.clock import NANOSECONDS
 from drivers.core.contacts import Array
 from drivers.shadow.model.kinematics import JOINTS
-from sessions.recording.traffic import schemas
-from sessions.recording.traffic.foxglove import pose_of
+from sessions.recording.traffic import schemas, told
 from sessions.rig_runtime.state_recording import BASE_JOINTS
 from tactile_lab.outline_walls import wall
 from tactile_lab.viewers.camera_pose import CameraPose
@@ -37,7 +34,6 @@ from tactile_lab.viewers.items import (
     Remark,
     SensorWrench,
     Surface,
-    Touch,
     Touches,
 )
 from tactile_lab.viewers.robot import CAMERA, OBJECT, TRUE_OBJECT, WORLD, Placement, Robot
@@ -101,15 +97,17 @@ class Story:
             if read is not None:
                 yield from read(self, stamp_ns, content)
             elif finger is not None:
-                yield from self.wrench(_stamp(content), finger, np.array([*content["force_N"], *content["torque_Nm"]]))
+                yield from self.wrench(
+                    told.stamp_ns(content), finger, np.array([*content["force_N"], *content["torque_Nm"]])
+                )
         except (KeyError, TypeError, AttributeError, IndexError) as error:
             raise ValueError(f"{topic}: {error!r}") from error
 
     # --- one topic each ----------------------------------------------------------------------------------------
 
     def _joints(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
-        told = {joint["name"]: joint["position"] for joint in content["joints"]}
-        joints_rad, base_q = ([told.get(name, 0.0) for name in names] for names in (JOINTS, BASE_JOINTS))
+        positions = {joint["name"]: joint["position"] for joint in content["joints"]}
+        joints_rad, base_q = ([positions.get(name, 0.0) for name in names] for names in (JOINTS, BASE_JOINTS))
         yield from self.state(stamp_ns, np.array(joints_rad, dtype=float), np.array(base_q, dtype=float))
 
     def _loads(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
@@ -117,29 +115,28 @@ class Story:
         yield Loads(stamp_ns, content["load_N"], frames)
 
     def _contacts(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
-        index = int(content["index"])
+        index, touches = told.grasp(content)
         gone = tuple(number for number in self._grasps if number >= index)
         self._grasps = [*(number for number in self._grasps if number < index), index]
-        yield Touches(stamp_ns, index, tuple(_touch(one) for one in content["contacts"]), gone)
+        yield Touches(stamp_ns, index, touches, gone)
 
     def _slam_pose(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
-        self._estimate = pose_of(content["pose"]["position"], content["pose"]["orientation"])
+        self._estimate = told.pose(content)
         yield from ()  # told with its covariance, which comes next
 
     def _slam_state(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
         if (pose := self._estimate) is None:
             return
         self._estimate, self._objects[OBJECT] = None, pose
-        yield ObjectPose(stamp_ns, pose, _covariance(content.get("covariance")))
+        yield ObjectPose(stamp_ns, pose, _in_six(told.covariance(content)))
         yield Frames(stamp_ns, (Placement(WORLD, OBJECT, pose),))
 
     def _surface(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
-        vertices_m = np.array(content["vertices_m"], dtype=float).reshape(-1, 3)
-        triangles = np.array(content["faces"], dtype=np.int64).reshape(-1, 3)
-        sigma_m = np.array(content["sigma_m"], dtype=float)
-        if int(content["dimension"]) == 2 and len(vertices_m):
-            vertices_m, triangles, sigma_m = wall(vertices_m, float(content["origin_height_m"]), sigma_m)
-        yield Surface(stamp_ns, vertices_m, triangles, sigma_m, float(content["explored"]))
+        found = told.surface(content)
+        vertices_m, triangles, sigma_m = found.vertices_m, found.faces, found.sigma_m
+        if found.dimension == 2 and len(vertices_m):
+            vertices_m, triangles, sigma_m = wall(vertices_m, found.origin_height_m, sigma_m)
+        yield Surface(stamp_ns, vertices_m, triangles, sigma_m, found.explored)
 
     def _plan(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
         text = f"next: {content['closing']} ({content['reason']})"
@@ -152,7 +149,7 @@ class Story:
         yield Candidates(stamp_ns, found, f"{content['policy']}: {content['reason']}")
 
     def _truth(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
-        self._objects[TRUE_OBJECT] = pose = pose_of(content["pose"]["position"], content["pose"]["orientation"])
+        self._objects[TRUE_OBJECT] = pose = told.pose(content)
         yield ObjectPose(stamp_ns, pose, true=True)
 
     def _image(self, stamp_ns: int, content: Plain) -> Iterator[Item]:
@@ -198,26 +195,12 @@ def _finger_of(topic: str) -> str | None:
     return topic.split("/")[2] if is_wrench else None
 
 
-def _stamp(content: Plain) -> int:
-    return int(content["timestamp"]["sec"]) * NANOSECONDS + int(content["timestamp"]["nsec"])
-
-
-def _touch(content: Plain) -> Touch:
-    return Touch(
-        finger=str(content["finger"]),
-        point_world_m=np.array(content["point_world_m"], dtype=float),
-        normal_world=np.array(content["normal_world"], dtype=float),
-        covariance_m2=np.array(content["point_covariance_m2"], dtype=float),
-        force_N=float(content["force_N"]),
-    )
-
-
-def _covariance(planar: Any) -> Array | None:
+def _in_six(planar: Array | None) -> Array | None:
     """The (6, 6) form of a covariance of x, y, yaw."""
     if planar is None:
         return None
     full = np.zeros((6, 6))
-    full[np.ix_(_PLANAR, _PLANAR)] = np.array(planar, dtype=float)
+    full[np.ix_(_PLANAR, _PLANAR)] = planar
     return full
 
 

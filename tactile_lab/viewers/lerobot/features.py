@@ -15,8 +15,9 @@ import trimesh
 from gtsam import Pose3
 
 from drivers.core.contacts import Array
+from sessions.recording.traffic.told import Touch
 from tactile_lab.slam.shape.surfaces.sampling import sample_mesh_with_values
-from tactile_lab.viewers.items import ObjectPose, Surface, Touch
+from tactile_lab.viewers.items import ObjectPose, Surface
 from tactile_lab.viewers.lerobot.sampling import PHASES, Moment, SampledSession
 from tactile_lab.viewers.robot import POSITIONER_JOINTS, Robot
 
