@@ -1,9 +1,8 @@
-"""Meshes as objects of the simulated rig: put on the table, and split into convex pieces for the physics."""
+"""Meshes as objects of the simulated rig: put on the table."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 import trimesh
@@ -11,12 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.core.installed.extras import require_package
 from drivers.simulation.mesh_file import read_mesh
 from drivers.simulation.object_names import LYING, STANDING, posed_path
 
-_NEARLY_CONVEX = 0.96  # a mesh that fills this share of its convex hull is represented by the hull
-_MOST_PIECES = 16
 _LEANING_rad = np.radians(15.0)  # a scan that leans by less than this is meant to stand
 _LYING_rad = np.radians(45.0)  # an object turned by more than this from standing is lying
 _TOLD_rad, _TOLD_m = np.radians(5.0), 0.001
@@ -71,38 +67,6 @@ def _placed(lowest_m: float, turned_rad: float) -> tuple[str, ...]:
         return ()
     way = "raised" if lowest_m < 0 else "lowered"
     return (f"it was {way} by {1e3 * abs(lowest_m):.0f} mm, to stand on the table",)
-
-
-def convex_pieces(mesh: trimesh.Trimesh) -> tuple[Array, ...]:
-    """Corner points of convex pieces, each of shape (n, 3), whose union approximates the mesh.
-
-    A nearly convex mesh is one piece, its hull. Others are decomposed by CoACD with a fixed seed, so that one file
-    gives the same physics every time; that takes seconds.
-    """
-    if mesh.volume >= _NEARLY_CONVEX * mesh.convex_hull.volume:
-        return (np.asarray(mesh.convex_hull.vertices, float),)
-    return _decompose(mesh.vertices.tobytes(), mesh.faces.astype(np.int32).tobytes())
-
-
-@lru_cache(maxsize=8)
-def _decompose(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
-    require_package("coacd")
-    import coacd
-
-    coacd.set_log_level("error")
-    surface = coacd.Mesh(np.frombuffer(vertices).reshape(-1, 3), np.frombuffer(faces, np.int32).reshape(-1, 3))
-    pieces = coacd.run_coacd(
-        surface,
-        threshold=0.05,
-        max_convex_hull=_MOST_PIECES,
-        preprocess_mode="off",
-        resolution=1000,
-        mcts_nodes=10,
-        mcts_iterations=20,
-        mcts_max_depth=2,
-        seed=1,
-    )
-    return tuple(np.asarray(corners, float) for corners, _ in pieces)
 
 
 def _resting(mesh: trimesh.Trimesh, pose: str, where: str) -> Array:

@@ -21,7 +21,7 @@ from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad, joint_table
 from drivers.simulation.devices.geared_motors import DISTAL_COUPLING, motor_class
 from drivers.simulation.objects import Hull, ObjectModel, Piece
-from drivers.simulation.surfaces import GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
+from drivers.simulation.surfaces import FOOT, GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
 
 if TYPE_CHECKING:
     import mujoco
@@ -107,7 +107,7 @@ def _add_table(spec: Any, *, rolling: bool) -> None:
         size=[0.5, 0.5, 0.01],
         pos=[0, 0, -0.01],
         condim=6 if rolling else 3,  # rolling friction halves the simulation's speed, so only for objects that roll
-        **surface(GLASS, TABLE, HAND | TIP | OBJECT),
+        **surface(GLASS, TABLE, HAND | TIP | FOOT),
     )
 
 
@@ -257,9 +257,12 @@ def _add_object(spec: Any, target: ObjectModel, mass_kg: float) -> None:
     body = spec.worldbody.add_body(name="object", pos=[0, 0, target.rest_height_m])
     body.add_freejoint(name="object")
     _set_inertia(body, target, mass_kg)
+    kind = OBJECT if target.hull is not None else OBJECT | FOOT
     for index, piece in enumerate(target.pieces):
         shape = _piece_geometry(spec, piece, f"object piece {index}")
-        body.add_geom(name=f"object {index}", **shape, **surface(WOOD, OBJECT, HAND | TIP | TABLE))
+        body.add_geom(name=f"object {index}", **shape, **surface(WOOD, kind, HAND | TIP))
+    if target.hull is not None:
+        body.add_geom(name="object foot", **_piece_geometry(spec, target.hull, "foot"), **surface(WOOD, FOOT, 0))
 
 
 def _set_inertia(body: Any, target: ObjectModel, mass_kg: float) -> None:

@@ -17,8 +17,9 @@ from scipy.spatial import ConvexHull
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
-from drivers.simulation.mesh_object import convex_pieces, load_resting_mesh
+from drivers.simulation.mesh_object import load_resting_mesh
 from drivers.simulation.object_names import MESH_PREFIX
+from drivers.simulation.skin import skin
 
 _CURVE_SEGMENTS = 64  # chord error 0.06 mm on the largest curve
 _SPHERE_SUBDIVISIONS = 4  # 0.03 mm on a 35 mm sphere
@@ -79,12 +80,13 @@ class ObjectModel:
 
     Attributes:
         name: name in the catalogue, or ``mesh:<path>``.
-        pieces: convex pieces whose union the physics collides with.
+        pieces: convex pieces that the hand touches; without a hull they are solid, and stand on the table.
         mesh: watertight truth surface in the object frame, metres.
         foot_object_m: polygon of the underside, shape (n, 2), which the camera sees as a dark area.
         marker: the marker on the underside.
         rolls: whether the object can roll, so that the contact model needs rolling friction.
         scanned: whether the underside is as uneven as a scan, so that the physics must settle it into its resting pose.
+        hull: on which an object stands whose pieces are only a skin; None for another.
         changes: what was done to the mesh of a file, as sentences.
     """
 
@@ -95,6 +97,7 @@ class ObjectModel:
     marker: UndersideMarker
     rolls: bool = False
     scanned: bool = False
+    hull: Hull | None = None
     changes: tuple[str, ...] = ()
 
     @property
@@ -222,12 +225,13 @@ def _scan(name: str) -> ObjectModel:
     """
     loaded = load_resting_mesh(name)
     mesh = loaded.mesh
-    pieces = tuple(Hull(vertices) for vertices in convex_pieces(mesh))
+    pieces = tuple(map(Hull, skin(mesh)))
+    hull = Hull(np.asarray(mesh.convex_hull.vertices, float))
     lowest = mesh.bounds[0, 2]
     near_table = mesh.vertices[mesh.vertices[:, 2] < lowest + _FOOT_LAYER_m, :2]
     foot = _convex_outline(near_table)
     marker = _largest_marker(foot, lowest)
-    return ObjectModel(name, pieces, mesh, foot, marker, rolls=True, scanned=True, changes=loaded.changes)
+    return ObjectModel(name, pieces, mesh, foot, marker, rolls=True, scanned=True, hull=hull, changes=loaded.changes)
 
 
 def _convex_outline(points_m: Array) -> Array:

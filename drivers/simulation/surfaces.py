@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-HAND, TIP, OBJECT, TABLE = 1, 2, 4, 8
-"""Collision classes, one bit each."""
+HAND, TIP, OBJECT, TABLE, FOOT = 1, 2, 4, 8, 16
+"""Collision classes, one bit each: the hand touches objects, on the table stands what has a foot."""
 
 
 class Surface(NamedTuple):

@@ -15,12 +15,12 @@ import trimesh
 
 from drivers.core.contacts import Array
 from drivers.core.errors import SessionDataError, given_by_a_person
-from drivers.simulation.mesh_object import convex_pieces
 from sessions.perception.weighing.object_properties import Value
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.files.tables import RERUN
 from tactile_lab.evaluation.inertia import EvenBody
+from tactile_lab.models.convex_parts import convex_parts
 
 ASSUMED_DENSITY_kg_m3 = 600.0
 """Between a filled carton and wood; an unknown object's mass is this times its estimated volume."""
@@ -156,7 +156,7 @@ def make_model(
         name=name,
         surface=surface,
         sigma_m=sigma_m,
-        parts=tuple(_standing_hull(corners) for corners in convex_pieces(surface)),
+        parts=tuple(_standing_hull(corners) for corners in convex_parts(surface)),
         mass_kg=mass.value,
         mass_is_assumed=stated is None,
         friction=usual if friction is None else friction,

@@ -98,7 +98,6 @@ def written(mesh: trimesh.Trimesh, folder: Path, suffix: str = "ply") -> str:
 def test_mesh_file_becomes_an_object_about_its_centre_of_volume(tmp_path: Path) -> None:
     cone = trimesh.creation.cone(radius=0.03, height=0.06)
     model = object_model(written(cone, tmp_path))
-    assert len(model.pieces) == 1
     np.testing.assert_allclose(model.mesh.center_mass, 0, atol=1e-9)
     assert model.rest_height_m == pytest.approx(0.015, abs=1e-6)
 
@@ -116,14 +115,6 @@ def test_mesh_that_leans_a_little_is_stood_upright(tmp_path: Path) -> None:
     block.apply_transform(trimesh.transformations.rotation_matrix(np.radians(4), [1, 1, 0]))
     model = object_model(written(block, tmp_path))
     np.testing.assert_allclose(model.mesh.extents, (0.04, 0.03, 0.06), atol=2e-4)
-
-
-def test_hollow_mesh_is_cut_into_the_same_convex_pieces_every_time(tmp_path: Path) -> None:
-    ring = trimesh.creation.annulus(r_min=0.02, r_max=0.035, height=0.04, sections=24)
-    first, second = (object_model(written(ring, tmp_path, suffix)) for suffix in ("ply", "stl"))
-    assert 3 < len(first.pieces) <= 16
-    assert len(first.pieces) == len(second.pieces)
-    assert sum(map(piece_volume_m3, first.pieces)) == pytest.approx(ring.volume, rel=0.15)
 
 
 @pytest.mark.parametrize(
@@ -154,7 +145,6 @@ def test_missing_mesh_file_is_refused() -> None:
 
 def check_scan(model: ObjectModel) -> None:
     assert model.mesh.is_watertight
-    assert sum(map(piece_volume_m3, model.pieces)) == pytest.approx(model.mesh.volume, rel=0.1)
     assert 0.012 <= model.marker.side_m <= 0.035
 
 

@@ -1,0 +1,115 @@
+"""What the physics feels of a mesh: its true surface, also where that is hollow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import igl
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from gtsam import Pose2, Pose3
+
+from drivers.core.contacts import FINGERS
+from drivers.simulation.calibration import SimulatedCalibration
+from drivers.simulation.model import build_model
+from drivers.simulation.objects import object_model
+from drivers.simulation.plant import Plant
+from drivers.simulation.skin import MOST_PIECES, LARGEST_GAP_m, simplified, skin
+
+BALL_m = 0.008
+
+
+def bowl() -> trimesh.Trimesh:
+    """A ball's half, 40 mm, with a hollow of 36 mm in it."""
+    angles = np.linspace(0, np.pi / 2, 24)
+    outside, inside = ([(r * np.sin(a), -r * np.cos(a)) for a in angles] for r in (0.040, 0.036))
+    return trimesh.creation.revolve([*outside, *reversed(inside)], sections=48)
+
+
+def rough_ball() -> trimesh.Trimesh:
+    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.03)
+    ball.vertices *= 1 + 0.05 * np.random.default_rng(1).random((len(ball.vertices), 1))
+    return ball
+
+
+def written(mesh: trimesh.Trimesh, folder: Path, suffix: str = "ply") -> str:
+    path = folder / f"part.{suffix}"
+    mesh.export(path)
+    return f"mesh:{path}"
+
+
+SHAPES = {
+    "block": trimesh.creation.box((0.08, 0.05, 0.03)),
+    "ring": trimesh.creation.annulus(r_min=0.02, r_max=0.035, height=0.04, sections=24),
+    "bowl": bowl(),
+    "finely meshed block": trimesh.creation.box((0.08, 0.05, 0.03)).subdivide_to_size(0.002),
+}
+
+
+@pytest.mark.parametrize("mesh", SHAPES.values(), ids=SHAPES)
+def test_the_felt_surface_is_the_true_one(mesh: trimesh.Trimesh) -> None:
+    pieces = np.array(skin(mesh))
+    felt_m = trimesh.triangles.area(pieces[:, :3]).sum()
+    assert felt_m == pytest.approx(mesh.area, rel=0.01)
+    away_m2 = igl.point_mesh_squared_distance(pieces[:, :3].mean(axis=1), mesh.vertices, mesh.faces.astype(np.int64))[0]
+    assert np.sqrt(away_m2.max()) < LARGEST_GAP_m
+
+
+@pytest.mark.parametrize("mesh", SHAPES.values(), ids=SHAPES)
+def test_pieces_lie_inside(mesh: trimesh.Trimesh) -> None:
+    behind = np.array(skin(mesh))[:, 3]
+    distance_m = igl.signed_distance(behind, mesh.vertices, mesh.faces.astype(np.int64))[0]
+    assert distance_m.max() < 0
+
+
+def test_many_triangles_of_a_flat_side_become_few() -> None:
+    fine = SHAPES["finely meshed block"]
+    assert len(fine.faces) > 10_000
+    assert len(skin(fine)) < 1000
+
+
+def test_a_rough_mesh_has_no_more_than_a_bounded_number() -> None:
+    assert len(rough_ball().faces) > MOST_PIECES
+    fewer = simplified(rough_ball())
+    assert len(fewer.faces) <= MOST_PIECES
+    assert fewer.is_watertight
+
+
+def test_one_surface_from_two_files_has_one_skin(tmp_path: Path) -> None:
+    first, second = (object_model(written(SHAPES["ring"], tmp_path, suffix)) for suffix in ("ply", "stl"))
+    assert len(first.pieces) == len(second.pieces)
+
+
+def lowest_m(mesh: trimesh.Trimesh, start_m: tuple[float, float, float]) -> float:
+    """Height of a ball's lowest point after it fell on a mesh's skin and came to rest."""
+    spec = mujoco.MjSpec()
+    for index, corners in enumerate(skin(mesh)):
+        piece = spec.add_mesh(name=f"{index}", uservert=corners.ravel())
+        piece.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{index}")
+    ball = spec.worldbody.add_body(name="ball", pos=start_m)
+    ball.add_freejoint()
+    ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[BALL_m, 0, 0], mass=0.01)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 2000)
+    return float(data.body("ball").xpos[2]) - BALL_m
+
+
+def test_a_ball_falls_to_the_bottom_of_a_hollow() -> None:
+    assert lowest_m(bowl(), (0.004, 0.0, 0.0)) == pytest.approx(-0.036, abs=0.0006)
+
+
+def test_a_ball_falls_through_a_ring() -> None:
+    assert lowest_m(SHAPES["ring"], (0.0, 0.0, 0.05)) < -0.1
+
+
+def test_a_mesh_stands_on_its_hull(tmp_path: Path) -> None:
+    target = object_model(written(bowl(), tmp_path))
+    tips = {finger: SimulatedCalibration.from_package().tip_body(finger, "nano17") for finger in FINGERS}
+    plant = Plant(build_model(target, 0.3, tips, Pose3()), Pose2())
+    plant.settle(1.0)
+    assert plant.world_T_object.z() == pytest.approx(target.rest_height_m, abs=2e-4)
+    assert plant.link_loads_N() == {}
