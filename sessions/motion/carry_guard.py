@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_fingers import GraspFingers
-from sessions.motion.grasp_plan import holds
+from sessions.motion.motion import smooth
 from sessions.perception.carrying.slip import Slip
 
-_LEAST_HOLD_N = 0.05
-"""A fingertip that presses less holds nothing; what is not held does not slip, and its carry goes on."""
+
+def cycles_evenly_along(cycles: int, parts: int) -> frozenset[int]:
+    """The cycles, counted from one, at whose beginning a motion has made another of so many equal parts of its way."""
+    made = [int(parts * smooth(cycle / cycles)) for cycle in range(cycles)]
+    return frozenset(cycle + 1 for cycle in range(1, cycles) if made[cycle] > made[cycle - 1])
 
 
 class CarryGuard:
@@ -20,8 +23,9 @@ class CarryGuard:
         fingers: that hold the object.
         targets_N: their forces.
         settings: limits.
-        cycle_s: length of a cycle.
-        slip: how far the object has slipped in this carry; None where the fingertips do not tell it.
+        asked: cycles, counted from one, in which the fingertips are asked for the slip.
+        slip: how far the object has slipped in this carry; None where the fingertips do not tell it. What they lose has
+            slipped as far as the hand moves without it.
     """
 
     def __init__(
@@ -29,11 +33,11 @@ class CarryGuard:
         fingers: GraspFingers,
         targets_N: dict[str, float],
         settings: CycleSettings,
-        cycle_s: float,
+        asked: Collection[int],
         slip: Callable[[], Slip | None],
     ) -> None:
         self._fingers, self._targets_N, self._settings, self._slip = fingers, targets_N, settings, slip
-        self._every = max(1, round(settings.slip_check_s / cycle_s))
+        self._asked = asked
         self._cycles = self._pressed_cycles = 0
         self.jammed: tuple[str, ...] = ()
         """The fingertips that were pressed so hard that the carry ended."""
@@ -49,7 +53,7 @@ class CarryGuard:
         if self._pressed_cycles > s.pressed_cycles:
             self.jammed = pressed
         self._cycles += 1
-        if self._cycles % self._every == 0 and holds(frozenset(self._fingers.pressed(_LEAST_HOLD_N))):
+        if self._cycles in self._asked:
             found = self._slip()
             if found is not None and (found.far_m > s.carry_slip_m or found.turned_rad > s.carry_slip_rad):
                 self.slipped = found

@@ -102,7 +102,7 @@ class CycleSettings(StrictModel):
             table pulls let the object slip.
         finger_rad_s: speed of the fastest joint when the hand opens; motors that fall behind would leave the path.
         carry_slip_m, carry_slip_rad: slip of the object at which a carry ends where it is, as the fingertips feel it.
-        slip_check_s: how often they are asked.
+        slip_check_s: how often they are asked, on average; evenly along the hand's way.
         touch: taps on the top and probes from the side.
         weighing: how a held object is weighed.
         finger_gap_m: the thumb stops at this distance from another tip's centre, before they touch each other.
@@ -143,7 +143,7 @@ class CycleSettings(StrictModel):
     carry_slack: float = Field(default=0.6, ge=0.0, lt=1.0)
     carry_slip_m: float = Field(default=0.004, gt=0.0)
     carry_slip_rad: float = Field(default=float(np.deg2rad(5.0)), gt=0.0)
-    slip_check_s: float = Field(default=0.2, gt=0.0)
+    slip_check_s: float = Field(default=0.25, gt=0.0)
     finger_rad_s: float = Field(default=1.8, gt=0.0)
     touch: TouchSettings = TouchSettings()
     weighing: WeighingSettings = WeighingSettings()

@@ -11,7 +11,7 @@ from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
 from drivers.shadow.closing.hand_envelope import lowest_inside_m, open_hand
 from drivers.shadow.closing.posture import HandShape
-from sessions.motion.carry_guard import CarryGuard
+from sessions.motion.carry_guard import CarryGuard, cycles_evenly_along
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_fingers import GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
@@ -292,12 +292,14 @@ class GraspCycle:
         world_T_before = motion.runtime.perception.hand.world_T_palm
         motion.runtime.begin_hold()
         begun_ns, held = motion.runtime.clock.now_ns(), motion.runtime.perception.held
-        guard = CarryGuard(self.fingers, targets_N, self.settings, motion.cycle_s, lambda: held.slip_since(begun_ns))
+        duration_s = self._carry_s(turn_rad, shift_world_m)
+        asked = cycles_evenly_along(motion.path_cycles(duration_s), round(duration_s / self.settings.slip_check_s))
+        guard = CarryGuard(self.fingers, targets_N, self.settings, asked, lambda: held.slip_since(begun_ns))
 
         def base_at(share: float) -> Array:
             return motion.base_joints(self._carried_to(share, turn_rad, shift_world_m), table)
 
-        share = motion.follow(base_at, self._carry_s(turn_rad, shift_world_m), guard.hold)
+        share = motion.follow(base_at, duration_s, guard.hold)
         self.jammed, self.slipped = guard.jammed, guard.slipped
         if self.jammed:
             self.fingers.build_up(targets_N, self.settings.squeeze_s)

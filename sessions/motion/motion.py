@@ -140,10 +140,14 @@ class Motion:
             duration_s: at full speed.
             is_careful: its speed was chosen for a first touch, so that the first approach does not slow it down.
         """
-        supervisor = self.supervisor
-        count = self.cycles(duration_s / (supervisor.careful_scale if is_careful else supervisor.speed_scale))
+        count = self.path_cycles(duration_s, is_careful=is_careful)
         for step in range(1, count + 1):
             yield step / count
+
+    def path_cycles(self, duration_s: float, *, is_careful: bool = False) -> int:
+        """In how many cycles :meth:`shares` goes through a motion."""
+        supervisor = self.supervisor
+        return self.cycles(duration_s / (supervisor.careful_scale if is_careful else supervisor.speed_scale))
 
     # --- the positioner ----------------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ from gtsam import Pose2
 
 from drivers.core.contacts import FINGERS, Array, Contact
 from sessions.perception.carrying.friction_balance import Balance, Friction, compose_steps
-from sessions.perception.carrying.planar_motions import displacement, planar_matrices
+from sessions.perception.carrying.planar_motions import displacements, planar_matrices
 from sessions.perception.carrying.tip_steps import TipSteps
 
 _STEPS, _ITERATIONS = 25, 12
@@ -96,7 +96,7 @@ class IntendedCarry:
         yielding = replace(friction, normal_weight=float(hardness))
         motion = compose_steps(balance.solve([yielding], _ITERATIONS), balance.centres_m)[0]
         palm = planar_matrices(steps.world_T_palm[[0, -1]])[0]
-        slip = displacement(np.linalg.inv(palm) @ motion, balance.centres_m[0])
+        slip = displacements(np.linalg.inv(palm) @ motion, balance.centres_m[0])
         height_m = float(np.mean([contact.point_world_m[2] for contact in self.contacts]))
         leans = friction.table_N * height_m > weight_N * friction.half_width_m
         return Forecast(force_N, float(np.hypot(*slip[:2])), float(abs(slip[2])), bool(leans))

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -30,7 +31,7 @@ round object turn in a hand that holds it: its normals all go through the axis, 
 """
 _LEAST_WEIGHT = np.diag([1e-3, 1e-3, 1e-6])
 """Keeps a step determined in which nothing holds the object, not even the table."""
-
+_OF_SQUARES = np.array([1.0] * 9 + [-2.0] * 3)
 
 _FOOT_SHARE = 0.6
 """Radius at which the table's friction acts against a turn, as a share of the foot's: 2/3 for a disc that presses
@@ -101,8 +102,8 @@ class Balance:
     Attributes:
         centres_m: reference points, shape (n, 2).
         forces_N: normal forces, shape (n, 5).
-        sticking, sticking_gradient, sliding_squared: square of a tangential relative motion as y' A y - 2 b' y + c,
-            shapes (n, 5, 9), (n, 5, 3), (n, 5).
+        tangential, tangential_squared: square of a tangential relative motion as y' A y - 2 b' y + c: the elements of A
+            and of b, shape (n, 5, 12), and c, shape (n, 5).
         entering, entering_gradient: of the motions along the normals, summed, shapes (n, 3, 3) and (n, 3).
         giving_gradient: what the latter grows by for each metre of give, shape (n, 3).
         step_s: shape (n,).
@@ -110,9 +111,8 @@ class Balance:
 
     centres_m: Array
     forces_N: Array
-    sticking: Array
-    sticking_gradient: Array
-    sliding_squared: Array
+    tangential: Array
+    tangential_squared: Array
     entering: Array
     entering_gradient: Array
     giving_gradient: Array
@@ -135,9 +135,8 @@ class Balance:
         return cls(
             centres_m=centres_m,
             forces_N=forces_N,
-            sticking=sticking.reshape(*forces_N.shape, 9),
-            sticking_gradient=gradient,
-            sliding_squared=squared,
+            tangential=np.concatenate([sticking.reshape(*forces_N.shape, 9), gradient], axis=-1),
+            tangential_squared=squared,
             entering=np.einsum("nf,nfi,nfj->nij", forces_N, across, across),
             entering_gradient=np.einsum("nf,nfi,nf->ni", forces_N, across, along),
             giving_gradient=np.einsum("nf,nfi,nf->ni", forces_N, across, steps.sinking),
@@ -156,49 +155,63 @@ class Balance:
             np.array([getattr(choice, name) for choice in choices])
             for name in ("tips", "table_N", "foot_m", "normal_weight", "give_m")
         )
-        shape = (len(self.centres_m), len(choices), 3)
-        motions = np.zeros(shape) if start is None else np.broadcast_to(start[:, None], shape)
-        fixed = hardness[:, None] * self.entering.reshape(-1, 1, 9) + _LEAST_WEIGHT.ravel()
+        terms = np.zeros((len(self.centres_m), len(choices), 12))
+        motions = terms[..., 9:]
+        if start is not None:
+            motions[:] = start[:, None]
+        fixed = np.empty_like(terms)
+        fixed[..., :9] = hardness[:, None] * self.entering.reshape(-1, 1, 9) + _LEAST_WEIGHT.ravel()
         given = give_m[:, None] * self.giving_gradient[:, None]
-        pull = hardness[:, None] * (self.entering_gradient[:, None] + given)
-        strength_N = tips[:, None] * self.forces_N[:, None]
+        fixed[..., 9:] = hardness[:, None] * (self.entering_gradient[:, None] + given)
+        strength_N, foot_squared = tips[:, None] * self.forces_N[:, None], foot_m**2
         creep_m, rest_m = (speed * self.step_s[:, None] for speed in (TIP_CREEP_m_s, TABLE_CREEP_m_s))
         for _ in range(iterations):
-            grip = strength_N / np.maximum(self._sliding_m(motions), creep_m[..., None])
-            dragged_m = np.sqrt(motions[..., 0] ** 2 + motions[..., 1] ** 2 + (foot_m * motions[..., 2]) ** 2)
+            grip = strength_N / np.maximum(self._sliding_m(terms), creep_m[..., None])
+            dragged_m = np.sqrt(terms[..., 0] + terms[..., 4] + foot_squared * terms[..., 8])
             drag = table_N / np.maximum(dragged_m, rest_m)
-            stiffness = fixed + grip @ self.sticking
-            stiffness[..., 0] += drag
-            stiffness[..., 4] += drag
-            stiffness[..., 8] += foot_m**2 * drag
-            motions = _solve(stiffness, pull + grip @ self.sticking_gradient)
+            system = grip @ self.tangential
+            system += fixed
+            system[..., 0] += drag
+            system[..., 4] += drag
+            system[..., 8] += foot_squared * drag
+            _solve(system, motions)
         return np.asarray(motions.swapaxes(0, 1))
 
     def sliding_m(self, motions: Array) -> Array:
         """Tangential motion of each fingertip relative to the object, shape (n, 5), for motions (n, 3)."""
-        return self._sliding_m(motions[:, None])[:, 0]
+        return self._sliding_m(np.concatenate([np.zeros((len(motions), 9)), motions], axis=-1)[:, None])[:, 0]
 
-    def _sliding_m(self, motions: Array) -> Array:
-        """The same for several motions of each step: shape (n, k, 5), for motions (n, k, 3)."""
-        products = (motions[..., :, None] * motions[..., None, :]).reshape(*motions.shape[:-1], 9)
-        squares = products @ self.sticking.swapaxes(1, 2) - 2 * (motions @ self.sticking_gradient.swapaxes(1, 2))
-        return np.sqrt(np.maximum(squares + self.sliding_squared[:, None], 0.0))
+    @cached_property
+    def _of_squares(self) -> Array:
+        return np.asarray(self.tangential.swapaxes(1, 2) * _OF_SQUARES[:, None])
+
+    def _sliding_m(self, terms: Array) -> Array:
+        """The same for several motions of each step: shape (n, k, 5).
+
+        Args:
+            terms: room for the products of a motion's elements, and the motion, shape (n, k, 12).
+        """
+        motions = terms[..., 9:]
+        products = terms[..., :9].reshape(*terms.shape[:-1], 3, 3)
+        np.multiply(motions[..., :, None], motions[..., None, :], out=products)
+        squares = terms @ self._of_squares
+        squares += self.tangential_squared[:, None]
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares))
 
 
-def _solve(matrices: Array, right: Array) -> Array:
-    """Solutions of symmetric positive definite systems of three, shape (..., 3), from (..., 9) and (..., 3).
+def _solve(systems: Array, into: Array) -> None:
+    """Solves symmetric positive definite systems of three: matrix and right side in (..., 12), solution (..., 3).
 
     Written out (L D L'), which takes a tenth of the time of a call of LAPACK for each.
     """
-    a, b, c, d, e, f = (matrices[..., at] for at in (0, 1, 2, 4, 5, 8))
+    a, b, c, _, d, e, _, _, f, x, y, z = systems.transpose(2, 0, 1)
     b_a, c_a = b / a, c / a
     d_left, e_left = d - b_a * b, e - c_a * b
     e_d = e_left / d_left
-    x, y, z = (right[..., axis] for axis in range(3))
     y_left = y - b_a * x
     z = (z - c_a * x - e_d * y_left) / (f - c_a * c - e_d * e_left)
     y = y_left / d_left - e_d * z
-    return np.stack([x / a - b_a * y - c_a * z, y, z], axis=-1)
+    into[..., 0], into[..., 1], into[..., 2] = x / a - b_a * y - c_a * z, y, z
 
 
 def _centres_m(steps: TipSteps) -> Array:

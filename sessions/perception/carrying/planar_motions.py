@@ -19,7 +19,8 @@ def planar_matrices(frames: Array) -> Array:
     return planar
 
 
-def displacement(motion: Array, middle_m: Array) -> Array:
-    """Displacement of a point by a planar motion, and the motion's angle, shape (3,)."""
-    moved = motion[:2, :2] @ middle_m + motion[:2, 2] - middle_m
-    return np.array([*moved, np.arctan2(motion[1, 0], motion[0, 0])])
+def displacements(motions: Array, middle_m: Array) -> Array:
+    """Displacement of a point by each planar motion, shape (..., 3, 3), and the motion's angle: shape (..., 3)."""
+    moved = motions[..., :2, :2] @ middle_m + motions[..., :2, 2] - middle_m
+    turned = np.arctan2(motions[..., 1, 0], motions[..., 0, 0])
+    return np.concatenate([moved, turned[..., None]], axis=-1)

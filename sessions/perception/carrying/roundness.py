@@ -47,15 +47,18 @@ class Roundness:
         spare = max(float(steps.felt.sum(axis=1).mean()) - _HELD_BY, _LEAST_SPARE)
         if not held.any():
             return cls(0.0, spare, 0.0)
-        lever_m = float(np.median(_levers_m(balance.entering[held], balance.forces_N[held])))
+        levers_m = np.sort(_levers_m(balance.entering[held], balance.forces_N[held]))
+        lever_m = float(levers_m[len(levers_m) // 2])
         return cls(1.0 / (1.0 + (lever_m / _ROUND_m) ** 2), spare, min(_lean(steps), _MOST_LEAN))
 
 
 def _levers_m(entering: Array, forces_N: Array) -> Array:
     """Mean lever of the normal forces about the axis that they turn the object least about, shape (n,)."""
     share = entering / forces_N.sum(axis=1)[:, None, None]
-    moved = np.linalg.pinv(share[:, :2, :2], rcond=_RCOND, hermitian=True) @ share[:, :2, 2:]
-    return np.asarray(np.sqrt(np.maximum(share[:, 2, 2] - (share[:, 2:, :2] @ moved)[:, 0, 0], 0.0)))
+    values, axes = np.linalg.eigh(share[:, :2, :2])
+    along_m = (share[:, 2:, :2] @ axes)[:, 0]
+    shifts = np.where(values > _RCOND * values[:, 1:], along_m**2 / np.maximum(values, 1e-12), 0.0)
+    return np.asarray(np.sqrt(np.maximum(share[:, 2, 2] - shifts.sum(axis=1), 0.0)))
 
 
 def _lean(steps: TipSteps) -> float:

@@ -11,7 +11,7 @@ from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, compose_steps
-from sessions.perception.carrying.planar_motions import displacement, planar_matrices
+from sessions.perception.carrying.planar_motions import displacements, planar_matrices
 from sessions.perception.carrying.tip_steps import tip_steps
 
 _ITERATIONS = 5
@@ -45,5 +45,5 @@ def slip(
     balance = Balance.of(steps)
     moved = compose_steps(balance.solve([friction], _ITERATIONS), balance.centres_m)[0]
     palm = planar_matrices(steps.world_T_palm[[0, -1]])[0]
-    far_x, far_y, turned = displacement(np.linalg.inv(palm) @ moved, balance.centres_m[0])
+    far_x, far_y, turned = displacements(np.linalg.inv(palm) @ moved, balance.centres_m[0])
     return Slip(float(np.hypot(far_x, far_y)), float(abs(turned)))

@@ -21,7 +21,7 @@ _LEAST_SPREAD = 0.3
 
 def tilt_rad(steps: TipSteps) -> float:
     """How far the object leans at the end against the beginning; 0 if it stands, or if its normals do not tell."""
-    span = max(1, round(_SPAN_s / float(np.median(steps.step_s))))
+    span = max(1, round(_SPAN_s / float(np.sort(steps.step_s)[len(steps) // 2])))
     first, last = (_mean_normals(steps, part) for part in (slice(None, span), slice(-span, None)))
     both = ~np.isnan(first[:, 0]) & ~np.isnan(last[:, 0])
     if both.sum() < _LEAST_FINGERS:

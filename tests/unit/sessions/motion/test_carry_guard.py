@@ -4,31 +4,31 @@ from __future__ import annotations
 
 import pytest
 
-from sessions.motion.carry_guard import CarryGuard
+from sessions.motion.carry_guard import CarryGuard, cycles_evenly_along
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.perception.carrying.slip import Slip
 
-SETTINGS, CYCLE_s = CycleSettings(), 0.01
+SETTINGS, ASKED = CycleSettings(), (20, 40, 60, 80)
 LITTLE, FAR = Slip(0.001, 0.01), Slip(0.005, 0.01)
 
 
 class Fingers:
     """Press as they are told, or too hard."""
 
-    def __init__(self, pressed=(), holding=("FF", "TH")):
-        self.told, self._pressed, self._holding = [], pressed, holding
+    def __init__(self, pressed=()):
+        self.told, self._pressed = [], pressed
 
     def servo_forces(self, targets_N, slack):
         self.told.append((targets_N, slack))
 
     def pressed(self, force_N):
-        return self._holding if force_N < 0.1 else self._pressed
+        return self._pressed
 
 
-def carry(cycles, slips=None, pressed=(), holding=("FF", "TH")):
+def carry(cycles, slips=None, pressed=()):
     """The guard after so many cycles, and after how many it ended the carry."""
-    asked, fingers = iter(slips or []), Fingers(pressed, holding)
-    guard = CarryGuard(fingers, {"FF": 0.8}, SETTINGS, CYCLE_s, lambda: next(asked, None))
+    asked, fingers = iter(slips or []), Fingers(pressed)
+    guard = CarryGuard(fingers, {"FF": 0.8}, SETTINGS, ASKED, lambda: next(asked, None))
     ended = next((n for n in range(1, cycles + 1) if not guard.hold()), None)
     return guard, fingers, ended
 
@@ -43,13 +43,21 @@ def test_a_carry_without_slip_goes_on_with_the_slack_of_its_settings():
 @pytest.mark.parametrize("slip", [FAR, Slip(0.001, 0.1)])
 def test_a_slip_ends_it_when_it_is_next_asked_for(slip):
     guard, _, ended = carry(100, [LITTLE, slip])
-    assert ended == 2 * round(SETTINGS.slip_check_s / CYCLE_s)
+    assert ended == ASKED[1]
     assert guard.slipped == slip
     assert not guard.jammed
 
 
-def test_what_a_single_fingertip_touches_is_not_held_and_slips_no_more():
-    assert carry(100, [FAR] * 5, holding=("TH",))[2] is None
+def test_fingertips_are_asked_where_the_hand_has_made_equal_parts_of_its_way():
+    made = [(cycle - 1) / 100 for cycle in sorted(cycles_evenly_along(100, 5))]
+    assert [made_share * made_share * (3 - 2 * made_share) for made_share in made] == pytest.approx(
+        [0.2, 0.4, 0.6, 0.8], abs=0.02
+    )
+
+
+@pytest.mark.parametrize("parts", [0, 1])
+def test_of_a_short_way_nothing_is_asked(parts):
+    assert not cycles_evenly_along(20, parts)
 
 
 def test_fingertips_that_tell_no_slip_end_nothing():
