@@ -6,8 +6,12 @@ from collections.abc import Callable, Collection
 
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_fingers import GraspFingers
+from sessions.motion.grasp_plan import holds
 from sessions.motion.motion import smooth
 from sessions.perception.carrying.slip import Slip
+
+_LEAST_HOLD_N, _LOST_CYCLES = 0.1, 5
+"""A fingertip that presses less holds nothing, and an object that so many cycles in a row nothing holds is lost."""
 
 
 def cycles_evenly_along(cycles: int, parts: int) -> frozenset[int]:
@@ -24,8 +28,7 @@ class CarryGuard:
         targets_N: their forces.
         settings: limits.
         asked: cycles, counted from one, in which the fingertips are asked for the slip.
-        slip: how far the object has slipped in this carry; None where the fingertips do not tell it. What they lose has
-            slipped as far as the hand moves without it.
+        slip: how far the object has slipped in this carry; None where the fingertips do not tell it.
     """
 
     def __init__(
@@ -38,11 +41,11 @@ class CarryGuard:
     ) -> None:
         self._fingers, self._targets_N, self._settings, self._slip = fingers, targets_N, settings, slip
         self._asked = asked
-        self._cycles = self._pressed_cycles = 0
+        self._cycles = self._pressed_cycles = self._lost_cycles = 0
         self.jammed: tuple[str, ...] = ()
         """The fingertips that were pressed so hard that the carry ended."""
         self.slipped: Slip | None = None
-        """The slip that ended it."""
+        """The slip that ended it: it was far, or the fingers lost the object."""
 
     def hold(self) -> bool:
         """Hold for a cycle. Returns whether the carry goes on."""
@@ -53,8 +56,10 @@ class CarryGuard:
         if self._pressed_cycles > s.pressed_cycles:
             self.jammed = pressed
         self._cycles += 1
-        if self._cycles in self._asked:
+        self._lost_cycles = 0 if holds(frozenset(self._fingers.pressed(_LEAST_HOLD_N))) else self._lost_cycles + 1
+        is_lost = self._lost_cycles == _LOST_CYCLES
+        if is_lost or self._cycles in self._asked:
             found = self._slip()
-            if found is not None and (found.far_m > s.carry_slip_m or found.turned_rad > s.carry_slip_rad):
+            if found is not None and (is_lost or found.far_m > s.carry_slip_m or found.turned_rad > s.carry_slip_rad):
                 self.slipped = found
         return not self.jammed and self.slipped is None

@@ -194,7 +194,7 @@ class CarryOdometry:
         ]
         parts_rad = [
             while_held_rad,
-            noise.round_rad * held.loose / held.spare * float(_turns_rad(steps).sum()),
+            noise.round_rad * float(held.turns @ _turns_rad(steps)),
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],

@@ -31,25 +31,26 @@ class Roundness:
     """What the contacts of a carry show of the object.
 
     Attributes:
-        loose: 1 for an object whose turn no normal shows, towards 0 for one with corners.
-        spare: fingertips beyond the two that any object needs, at least 0.4.
+        loose: 1 for an object whose turn no normal shows, towards 0 for one with corners; median of the steps.
+        turns: of each step the same over the fingertips beyond the two that any object needs, at least 0.4; 0 where
+            fewer than two held it. Shape (n,).
         lean: sine of the angle by which its sides lean, at most 0.15.
     """
 
     loose: float
-    spare: float
+    turns: Array
     lean: float
 
     @classmethod
     def of(cls, steps: TipSteps, balance: Balance) -> Roundness:
         """Of a carry; one in which two fingertips never held the object at once is not called round."""
-        held = steps.felt.sum(axis=1) >= _HELD_BY
-        spare = max(float(steps.felt.sum(axis=1).mean()) - _HELD_BY, _LEAST_SPARE)
+        spare = steps.felt.sum(axis=1) - _HELD_BY
+        turns, held = np.zeros(len(steps)), spare >= 0
         if not held.any():
-            return cls(0.0, spare, 0.0)
-        levers_m = np.sort(_levers_m(balance.entering[held], balance.forces_N[held]))
-        lever_m = float(levers_m[len(levers_m) // 2])
-        return cls(1.0 / (1.0 + (lever_m / _ROUND_m) ** 2), spare, min(_lean(steps), _MOST_LEAN))
+            return cls(0.0, turns, 0.0)
+        loose = 1.0 / (1.0 + (_levers_m(balance.entering[held], balance.forces_N[held]) / _ROUND_m) ** 2)
+        turns[held] = loose / np.maximum(spare[held], _LEAST_SPARE)
+        return cls(float(np.sort(loose)[len(loose) // 2]), turns, min(_lean(steps), _MOST_LEAN))
 
 
 def _levers_m(entering: Array, forces_N: Array) -> Array:

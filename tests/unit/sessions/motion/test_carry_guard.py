@@ -15,19 +15,19 @@ LITTLE, FAR = Slip(0.001, 0.01), Slip(0.005, 0.01)
 class Fingers:
     """Press as they are told, or too hard."""
 
-    def __init__(self, pressed=()):
-        self.told, self._pressed = [], pressed
+    def __init__(self, pressed=(), holding=("FF", "TH")):
+        self.told, self._pressed, self._holding = [], pressed, holding
 
     def servo_forces(self, targets_N, slack):
         self.told.append((targets_N, slack))
 
     def pressed(self, force_N):
-        return self._pressed
+        return self._holding if force_N < 0.5 else self._pressed
 
 
-def carry(cycles, slips=None, pressed=()):
+def carry(cycles, slips=None, pressed=(), holding=("FF", "TH")):
     """The guard after so many cycles, and after how many it ended the carry."""
-    asked, fingers = iter(slips or []), Fingers(pressed)
+    asked, fingers = iter(slips or []), Fingers(pressed, holding)
     guard = CarryGuard(fingers, {"FF": 0.8}, SETTINGS, ASKED, lambda: next(asked, None))
     ended = next((n for n in range(1, cycles + 1) if not guard.hold()), None)
     return guard, fingers, ended
@@ -60,8 +60,15 @@ def test_of_a_short_way_nothing_is_asked(parts):
     assert not cycles_evenly_along(20, parts)
 
 
-def test_fingertips_that_tell_no_slip_end_nothing():
-    assert carry(100)[2] is None
+def test_what_the_fingers_lose_ends_it_however_little_it_has_slipped():
+    guard, _, ended = carry(100, [LITTLE], holding=("TH",))
+    assert ended == 5
+    assert guard.slipped == LITTLE
+
+
+@pytest.mark.parametrize("holding", [("FF", "TH"), ("TH",)])
+def test_fingertips_that_tell_no_slip_end_nothing(holding):
+    assert carry(100, holding=holding)[2] is None
 
 
 def test_a_fingertip_that_stays_pressed_ends_it():

@@ -42,6 +42,16 @@ def test_each_finger_that_holds_a_round_object_makes_its_turn_more_certain() -> 
     assert sigmas_rad[2] > 0.05 * TURN.theta()
 
 
+def test_a_while_in_which_two_fingers_hold_makes_a_turn_as_uncertain_as_they_do() -> None:
+    steps = turned(BOX)
+    forces_N = steps.forces_N.copy()
+    forces_N[20:, 1:4] = 0.0
+    lost = roundness(replace(steps, forces_N=forces_N))
+    assert lost.turns[:20] == pytest.approx(roundness(steps).turns[:20])
+    assert lost.turns[20:] == pytest.approx(lost.turns[20:].mean())
+    assert lost.turns[30] > 5 * lost.turns[10]
+
+
 def test_sides_that_lean_may_roll() -> None:
     upright, leaning = (turned(DISC, lean=lean) for lean in (0.0, 0.1))
     assert roundness(leaning).lean == pytest.approx(0.1, abs=0.01)
@@ -52,4 +62,6 @@ def test_sides_that_lean_may_roll() -> None:
 def test_an_object_that_nobody_holds_is_not_called_round() -> None:
     steps = turned(DISC)
     lost = replace(steps, forces_N=np.zeros_like(steps.forces_N))
-    assert roundness(lost) == Roundness(0.0, 0.4, 0.0)
+    found = roundness(lost)
+    assert (found.loose, found.lean) == (0.0, 0.0)
+    assert not found.turns.any()
