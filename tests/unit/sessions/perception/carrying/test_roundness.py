@@ -65,3 +65,17 @@ def test_an_object_that_nobody_holds_is_not_called_round() -> None:
     found = roundness(lost)
     assert (found.loose, found.lean) == (0.0, 0.0)
     assert not found.turns.any()
+
+
+def test_contacts_that_all_give_way_make_the_place_uncertain_by_what_they_would_squeeze_out() -> None:
+    wedge = {finger: ((0.0, 0.03 * side), (0.1, 0.995 * side)) for finger, side in (("FF", 1.0), ("TH", -1.0))}
+    away = {"FF": np.array([0.0, -0.008, 0.0]), "TH": np.array([0.0, 0.008, 0.0])}
+    held = {**BOX, **wedge}
+    still, closing = (
+        carried(held, object_motion=Pose2(), palm_motion=Pose2(), felt=tuple(wedge), extra_moves=moves, count=8)
+        for moves in (None, away)
+    )
+    odometry = CarryOdometry({}, "right")
+    squeezed = odometry.carry(closing)
+    assert squeezed.slip_m > 0.02
+    assert squeezed.sigma.translation_m > odometry.carry(still).sigma.translation_m + 0.3 * squeezed.slip_m
