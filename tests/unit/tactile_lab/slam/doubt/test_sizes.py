@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -32,3 +34,11 @@ def test_a_shape_whose_end_is_a_guess_is_partial_however_much_of_it_is_known() -
     assert "length 100 ± 40 mm" in doubt.words
     assert status_of(lost=False, known_share=0.97, doubts=[doubt]) == "partial"
     assert status_of(lost=False, known_share=0.97, doubts=[]) == "complete"
+
+
+def test_an_end_that_was_touched_at_one_corner_is_no_guess() -> None:
+    end, elsewhere = outline(0.040), np.array([True, False, False, True])
+    unknown_at_one = replace(end, sigma_m=np.array([0.0005, 0.0005, 0.040, 0.0005]), known=np.array([1, 1, 0, 1], bool))
+    assert unknown_sizes(unknown_at_one) == []
+    (doubt,) = unknown_sizes(replace(end, known=elsewhere))
+    assert "length 100 ± 40 mm" in doubt.words
