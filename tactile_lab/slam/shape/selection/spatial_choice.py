@@ -18,6 +18,7 @@ from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.held_out import predicts_better, predicts_better_than
 from tactile_lab.slam.shape.selection.unexplained import are_inside, unexplained
+from tactile_lab.slam.shape.solids.hollow import hollowed
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
@@ -91,7 +92,8 @@ def best_spatial_shape(
         best, most = _likelier(sectioned := _sectioned(gpis, floor_m), best, most)
         sharp = None if best is sectioned else sharp
     best = _rounder(best, sharp, everything, free_points_m, floor_m, most + left_out_nats)
-    return _with_missing_parts(best, everything, free_points_m, floor_m)
+    best = _with_missing_parts(best, everything, free_points_m, floor_m)
+    return _try_make(lambda: hollowed(best, everything, free_points_m, floor_m)) or best
 
 
 def _rounder(

@@ -1,0 +1,187 @@
+"""A body that is open from above, as a cup: hollow within a wall of the same thickness everywhere.
+
+Fingers that came down inside a rim tell that there is a cavity, but a model of what they touched closes it with a lid.
+Contacts on the rim tell how thick the wall is. How deep the cavity is nobody touched: it is assumed to leave as much
+for the floor, and both are the less certain the deeper they lie.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.spatial import Delaunay, QhullError
+
+from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.posterior import Prediction
+from tactile_lab.slam.shape.model import FittedShape
+from tactile_lab.slam.shape.solids.solid_field import SolidField
+from tactile_lab.slam.shape.surfaces.sampling import mesh_arrays
+from tactile_lab.slam.shape.surfaces.surface import Contour, Mask, SurfaceMesh, extract_mesh
+
+_UPWARD, _SIDEWAYS = 0.7, 0.7
+"""Least vertical part of a normal on the rim, and largest of one on a wall."""
+
+_RIM_m, _LEAST_RIM_CONTACTS = 0.020, 3
+_BELOW_RIM_m, _INSIDE_m, _WITHIN_m = 0.004, 0.001, 0.008
+"""A finger is in a cavity so far below the rim, so deep in what the model takes for solid, and over what it takes for
+solid so far from its sides: not beside a neck, over a shoulder.
+"""
+
+_GRID_m = 0.003
+_THICKNESS_m, _LEAST_FLOOR_m = (0.004, 0.010), 0.006
+"""Of walls, none so thin that the grid misses it, and least thickness of the floor."""
+
+_THICKNESS_SIGMA_m, _SIGMA_PER_DEPTH = 0.0015, 0.05
+_OFF_m = 0.006
+
+
+@dataclass(frozen=True)
+class Hollow:
+    """A body with a cavity; implements FittedShape. Made by :func:`hollowed`.
+
+    Attributes:
+        body: the model whose outside it has.
+        gpis: the field of all contacts.
+        wall_m: thickness of the wall.
+        rim_m: height of the rim.
+        entered_m: lowest height at which a finger was in the cavity.
+        floor_m: height of the table.
+    """
+
+    body: FittedShape
+    gpis: Gpis
+    wall_m: float
+    rim_m: float
+    entered_m: float
+    floor_m: float
+
+    @property
+    def name(self) -> str:
+        """Of the body, "hollow"."""
+        return f"hollow {self.body.name}"
+
+    @property
+    def bottom_m(self) -> float:
+        """Height at which the cavity ends."""
+        return self.floor_m + max(self.wall_m, _LEAST_FLOOR_m)
+
+    @property
+    def log_evidence(self) -> float | None:
+        """Of the body: no contact tells of the cavity."""
+        return self.body.log_evidence
+
+    def contour(self, resolution_m: float = 0.001) -> Contour:
+        """Raises ShapeError: a solid has no outline."""
+        raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
+
+    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
+        """The surface, no coarser than walls allow; it ends at the table for which it was made.
+
+        Raises:
+            ShapeError: nothing is inside.
+        """
+        return extract_mesh(self.field, resolution_m=min(resolution_m, _GRID_m), floor_m=self.floor_m)
+
+    @cached_property
+    def field(self) -> _HollowField:
+        """The body without the cavity, as a field."""
+        return _HollowField(self, self.body.mesh(_GRID_m, self.floor_m))
+
+
+class _HollowField:
+    """The signed distance from a hollow body, near its surface."""
+
+    sigma_inflation: float = 1.0
+    """Predicted variances are those of surfaces already."""
+
+    def __init__(self, shape: Hollow, mesh: SurfaceMesh) -> None:
+        self._shape, self._body = shape, SolidField(mesh, mesh.sigma_m)
+        self._walls = _walls(mesh)
+        self.contacts_m = np.vstack([shape.gpis.contacts_m, mesh.vertices[mesh.vertices.argmin(axis=0)]])
+
+    def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
+        """The field at points of shape (q, 3)."""
+        body = self._body.predict(points_m, gradient=gradient, variance=variance)
+        shape, (away_m, inward) = self._shape, _from_walls(points_m, *self._walls)
+        to_wall_m, to_floor_m = away_m - shape.wall_m, points_m[:, 2] - shape.bottom_m
+        is_wall = to_wall_m < to_floor_m
+        cavity_m = np.where(is_wall, to_wall_m, to_floor_m)
+        inside = cavity_m > body.mean_m
+        slope, variance_m2 = body.gradient, body.variance_m2
+        if gradient:
+            found = np.where(is_wall[:, None], inward, [0.0, 0.0, 1.0])
+            slope = np.where(inside[:, None], found, slope)
+        if variance:
+            variance_m2 = np.where(inside, self._sigma_m(points_m[:, 2], is_wall) ** 2, variance_m2)
+        return Prediction(np.where(inside, cavity_m, body.mean_m), slope, variance_m2)
+
+    def _sigma_m(self, heights_m: Array, is_wall: Mask) -> Array:
+        shape = self._shape
+        wall_m = np.hypot(_THICKNESS_SIGMA_m, _SIGMA_PER_DEPTH * np.maximum(shape.rim_m - heights_m, 0.0))
+        floor_m = max((shape.entered_m - shape.bottom_m) / 2, _THICKNESS_SIGMA_m)
+        return np.where(is_wall, wall_m, floor_m)
+
+
+def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float) -> FittedShape:
+    """A shape with a cavity where fingers went down inside its rim; otherwise the shape itself.
+
+    Args:
+        shape: the most probable model.
+        gpis: the field of all contacts.
+        free_points_m: places that a finger went through, shape (k, 3), or None.
+        floor_m: height of the table.
+
+    Raises:
+        ShapeError: the shape encloses nothing.
+    """
+    heights_m, up = gpis.contacts_m[:, 2], gpis.normals[:, 2] > _UPWARD
+    rim = up & (heights_m > heights_m.max() - _RIM_m)
+    if free_points_m is None or not len(free_points_m) or rim.sum() < _LEAST_RIM_CONTACTS:
+        return shape
+    rim_m, on_rim_m = float(np.median(heights_m[rim])), gpis.contacts_m[rim]
+    low_m = free_points_m[free_points_m[:, 2] < rim_m - _BELOW_RIM_m]
+    low_m = low_m[_surrounded(low_m, on_rim_m)]
+    if not len(low_m):
+        return shape
+    mesh = shape.mesh(_GRID_m, floor_m)
+    body = SolidField(mesh, 0.0)
+    below_m = np.column_stack([low_m[:, :2], np.full(len(low_m), (rim_m + floor_m) / 2)])
+    in_cavity = (body.predict(low_m).mean_m < -_INSIDE_m) & (body.predict(below_m).mean_m < -_WITHIN_m)
+    away_m, _ = _from_walls(gpis.contacts_m[up & (heights_m > (rim_m + floor_m) / 2)], *_walls(mesh))
+    if not in_cavity.any() or away_m.max() > _THICKNESS_m[1]:
+        return shape
+    wall_m = float(np.clip(2 * _from_walls(on_rim_m, *_walls(mesh))[0].mean(), *_THICKNESS_m))
+    hollow = Hollow(shape, gpis, wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
+    off_m = np.abs(hollow.field.predict(gpis.contacts_m).mean_m)
+    before_m = np.abs(body.predict(gpis.contacts_m).mean_m)
+    return hollow if np.sum(off_m > _OFF_m) <= np.sum(before_m > _OFF_m) else shape
+
+
+def _surrounded(places_m: Array, around_m: Array) -> Mask:
+    """Which places, seen from above, others surround; shapes (q, 3), (n, 3)."""
+    try:
+        return np.asarray(Delaunay(around_m[:, :2]).find_simplex(places_m[:, :2]) >= 0)
+    except QhullError:  # they are in a line
+        return np.zeros(len(places_m), dtype=bool)
+
+
+def _walls(mesh: SurfaceMesh) -> tuple[Array, Array]:
+    """Vertices and triangles of the walls of a surface."""
+    vertices, faces = mesh_arrays(mesh)
+    corners = vertices[faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
+    return vertices, np.ascontiguousarray(faces[np.abs(normals[:, 2]) < _SIDEWAYS * lengths])
+
+
+def _from_walls(points_m: Array, vertices: Array, faces: Array) -> tuple[Array, Array]:
+    """Distances from walls, shape (q,), and the directions away from them, shape (q, 3)."""
+    import igl  # here, so that importing this module stays quick
+
+    squares, _, nearest_m = igl.point_mesh_squared_distance(np.ascontiguousarray(points_m), vertices, faces)[:3]
+    away_m = np.sqrt(np.atleast_1d(squares))
+    return away_m, (points_m - np.reshape(nearest_m, (-1, 3))) / np.maximum(away_m, 1e-9)[:, None]

@@ -1,0 +1,65 @@
+"""Cups of which fingers felt the outside and the rim, and came down inside."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from drivers.core.contacts import Array
+from tactile_lab.experiments.data.household import turned
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.standing_field import StandingField
+from tactile_lab.slam.shape.solids.hollow import Hollow, hollowed
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
+from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
+
+WALL_m, RADIUS_m, HIGH_m = 0.005, 0.036, 0.080
+IN_CUP_m = np.array([[0.0, 0.0, 0.070], [0.008, 0.0, 0.066], [-0.005, 0.008, 0.072]])
+CUP = turned([0, 36, 36, 31, 31, 0], [0, 0, 80, 80, 5, 5])
+
+
+def felt(rim_m: float) -> Gpis:
+    """Contacts on the outer wall at three heights, and on the top, so far from the axis."""
+    around = np.linspace(0, 2 * np.pi, 10, endpoint=False)
+    out = np.column_stack([np.cos(around), np.sin(around), np.zeros(10)])
+    walls = [RADIUS_m * out + [0, 0, z] for z in (0.02, 0.045, 0.07)]
+    points_m = np.vstack([*walls, rim_m * out + [0, 0, HIGH_m]])
+    normals = np.vstack([out, out, out, np.tile([0.0, 0.0, 1.0], (10, 1))])
+    return Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
+
+
+def shape_of(field: Gpis, free_m: Array | None) -> object:
+    return hollowed(StandingField.fit(field, 0.0), field, free_m, 0.0)
+
+
+def test_a_cup_is_hollow_where_fingers_went_down_inside_its_rim() -> None:
+    hollow = shape_of(felt(RADIUS_m - WALL_m / 2), IN_CUP_m)
+    assert isinstance(hollow, Hollow)
+    assert hollow.wall_m == pytest.approx(WALL_m, abs=0.002)
+    mesh = hollow.mesh()
+    assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
+    assert distances_to_mesh(CUP.vertices, mesh).max() < 0.006
+    assert np.mean(distances_to_mesh(mesh.vertices, CUP)) < 0.0015
+
+
+def test_a_cavity_is_the_less_certain_the_deeper_it_is() -> None:
+    hollow = shape_of(felt(RADIUS_m - WALL_m / 2), IN_CUP_m)
+    assert isinstance(hollow, Hollow)
+    mesh = hollow.mesh()
+    reach_m, heights_m = np.linalg.norm(mesh.vertices[:, :2], axis=1), mesh.vertices[:, 2]
+    inside = reach_m < RADIUS_m - WALL_m / 2
+    near_rim, floor = inside & (np.abs(heights_m - 0.07) < 0.003), (reach_m < 0.02) & (heights_m > 0.002)
+    assert 0.001 < mesh.sigma_m[near_rim].mean() < 0.003
+    assert mesh.sigma_m[floor].min() > 0.02
+
+
+def test_a_lid_that_was_touched_stays_closed() -> None:
+    field = felt(0.015)
+    assert not isinstance(shape_of(field, IN_CUP_m), Hollow)
+
+
+def test_a_top_that_no_finger_went_through_stays_closed() -> None:
+    field = felt(RADIUS_m - WALL_m / 2)
+    assert not isinstance(shape_of(field, None), Hollow)
+    assert not isinstance(shape_of(field, np.array([[0.0, 0.0, 0.1], [0.05, 0.0, 0.04]])), Hollow)
