@@ -21,7 +21,20 @@ from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from drivers.shadow.model.kinematics import JOINT_TABLE, Joint, JOINT_LIMITS_rad, joint_table
 from drivers.simulation.devices.geared_motors import DISTAL_COUPLING, motor_class
 from drivers.simulation.objects import Hull, ObjectModel, Piece
-from drivers.simulation.surfaces import FOOT, GLASS, HAND, OBJECT, RUBBER, TABLE, TIP, WOOD, surface
+from drivers.simulation.surfaces import (
+    FOOT,
+    GLASS,
+    HAND,
+    OBJECT,
+    RUBBER,
+    RUBBER_ON_SKIN,
+    TABLE,
+    TIP,
+    WOOD,
+    WOODEN_SKIN,
+    Surface,
+    surface,
+)
 
 if TYPE_CHECKING:
     import mujoco
@@ -83,8 +96,9 @@ def build_model(
     _add_table(spec, rolling=target.rolls)
     forearm = _add_positioner(spec, world_T_mount)
     links = _add_links(forearm, form)
+    rubber = RUBBER if target.hull is None else RUBBER_ON_SKIN
     for finger in form.fingers:
-        _add_tip(spec, links[f"{finger}J1"], finger, tips[finger])
+        _add_tip(spec, links[f"{finger}J1"], finger, tips[finger], rubber)
     _add_motors(spec, form)
     _add_object(spec, target, object_mass_kg)
     return spec.compile()
@@ -201,7 +215,7 @@ def _geometry(shape: Shape) -> dict[str, Any]:
             return {"type": mujoco.mjtGeom.mjGEOM_ELLIPSOID, "pos": shape.centre_m, "size": shape.semi_axes_m}
 
 
-def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
+def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody, rubber: Surface) -> None:
     """Add the fingertip as a separate body, welded to the distal link through the force sensor."""
     name = f"{finger} tip"
     body = distal.add_body(name=name)
@@ -214,7 +228,7 @@ def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
         type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
         size=tip.semi_axes_m,
         **_place(tip.distal_T_skin),
-        **surface(RUBBER, TIP, OBJECT | TABLE),
+        **surface(rubber, TIP, OBJECT | TABLE),
     )
     body.add_site(name=name, **_place(tip.distal_T_sensor))
     body.add_site(name=f"{finger} distal")
@@ -257,10 +271,11 @@ def _add_object(spec: Any, target: ObjectModel, mass_kg: float) -> None:
     body = spec.worldbody.add_body(name="object", pos=[0, 0, target.rest_height_m])
     body.add_freejoint(name="object")
     _set_inertia(body, target, mass_kg)
-    kind = OBJECT if target.hull is not None else OBJECT | FOOT
+    touched = (
+        surface(WOOD, OBJECT | FOOT, HAND | TIP) if target.hull is None else surface(WOODEN_SKIN, OBJECT, HAND | TIP)
+    )
     for index, piece in enumerate(target.pieces):
-        shape = _piece_geometry(spec, piece, f"object piece {index}")
-        body.add_geom(name=f"object {index}", **shape, **surface(WOOD, kind, HAND | TIP))
+        body.add_geom(name=f"object {index}", **_piece_geometry(spec, piece, f"object piece {index}"), **touched)
     if target.hull is not None:
         body.add_geom(name="object foot", **_piece_geometry(spec, target.hull, "foot"), **surface(WOOD, FOOT, 0))
 

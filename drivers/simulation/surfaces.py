@@ -21,6 +21,9 @@ RUBBER = Surface((0.9, 0.003, 1e-4), (0.010, 1.0), (0.50, 0.90, 0.002, 0.5, 2.0)
 GLASS = Surface((0.35, 0.005, 0.002), (0.006, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0), priority=1)
 WOOD = Surface((0.5, 0.003, 1e-4), (0.004, 1.0), (0.95, 0.99, 0.0005, 0.5, 2.0))
 
+RUBBER_ON_SKIN, WOODEN_SKIN = RUBBER._replace(solref=(0.016, 1.0)), WOOD._replace(solref=(0.018, 1.0))
+"""What touches a skin touches some seven of its pieces at once: each is softer, all together are as soft as one."""
+
 
 def surface(contact: Surface, kind: int, touches: int) -> dict[str, Any]:
     """Geometry attributes of a surface of one collision class that collides with others."""
