@@ -26,13 +26,11 @@ from drivers.simulation.surfaces import (
     GLASS,
     HAND,
     OBJECT,
-    RUBBER,
-    RUBBER_ON_SKIN,
     TABLE,
     TIP,
     WOOD,
-    WOODEN_SKIN,
     Surface,
+    skin_surfaces,
     surface,
 )
 
@@ -96,11 +94,11 @@ def build_model(
     _add_table(spec, rolling=target.rolls)
     forearm = _add_positioner(spec, world_T_mount)
     links = _add_links(forearm, form)
-    rubber = RUBBER if target.hull is None else RUBBER_ON_SKIN
+    rubber, wood = skin_surfaces(target.pieces_at_once)
     for finger in form.fingers:
         _add_tip(spec, links[f"{finger}J1"], finger, tips[finger], rubber)
     _add_motors(spec, form)
-    _add_object(spec, target, object_mass_kg)
+    _add_object(spec, target, object_mass_kg, wood)
     return spec.compile()
 
 
@@ -267,13 +265,11 @@ def _add_distal_tendons(spec: Any, finger: str) -> None:
         tendon.wrap_joint(f"{finger}J2", share_of_j2)
 
 
-def _add_object(spec: Any, target: ObjectModel, mass_kg: float) -> None:
+def _add_object(spec: Any, target: ObjectModel, mass_kg: float, wood: Surface) -> None:
     body = spec.worldbody.add_body(name="object", pos=[0, 0, target.rest_height_m])
     body.add_freejoint(name="object")
     _set_inertia(body, target, mass_kg)
-    touched = (
-        surface(WOOD, OBJECT | FOOT, HAND | TIP) if target.hull is None else surface(WOODEN_SKIN, OBJECT, HAND | TIP)
-    )
+    touched = surface(wood, OBJECT | FOOT if target.hull is None else OBJECT, HAND | TIP)
     for index, piece in enumerate(target.pieces):
         body.add_geom(name=f"object {index}", **_piece_geometry(spec, piece, f"object piece {index}"), **touched)
     if target.hull is not None:

@@ -7,6 +7,7 @@ simplified mesh are right everywhere. They are many, but only few of them are ne
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import igl
@@ -31,6 +32,9 @@ _SLIVER_m2 = 1e-9
 _SAME_PLACE_m = 1e-5
 _SAMPLES = 20_000
 
+_PATCHES, _PATCH_m = 150, 0.003
+"""Radius of what a fingertip touches, a ball of 8 mm that sinks in by half a millimetre."""
+
 
 def skin(mesh: trimesh.Trimesh) -> tuple[Array, ...]:
     """Corners of convex pieces behind the surface of a closed mesh, each of shape (4, 3): a triangle of the surface,
@@ -48,6 +52,20 @@ def _skin(vertices: bytes, faces: bytes) -> tuple[Array, ...]:
     depths = np.clip(_SHARE_OF_WALL * _thickness_m(mesh, middles, inward), _FLATTEST_m, _DEEPEST_m)
     behind = middles + depths[:, None] * inward
     return tuple(np.concatenate([triangles, behind[:, None]], axis=1))
+
+
+def pieces_at_once(pieces: Sequence[Array]) -> float:
+    """How many pieces of a skin a fingertip touches that sinks in by half a millimetre, mean over the surface."""
+    triangles = np.array(pieces)[:, :3]
+    middles = triangles.mean(axis=1)
+    reach_m = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1) + _PATCH_m
+    surface = trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
+    touched = []
+    for place in trimesh.sample.sample_surface(surface, _PATCHES, seed=1)[0]:
+        near = triangles[np.linalg.norm(middles - place, axis=1) < reach_m]
+        closest = trimesh.triangles.closest_point(near, np.tile(place, (len(near), 1)))
+        touched.append(np.count_nonzero(np.linalg.norm(closest - place, axis=1) < _PATCH_m))
+    return float(np.mean(touched))
 
 
 def simplified(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import igl
@@ -11,12 +12,13 @@ import pytest
 import trimesh
 from gtsam import Pose2, Pose3
 
-from drivers.core.contacts import FINGERS
+from drivers.core.contacts import FINGERS, Array
 from drivers.simulation.calibration import SimulatedCalibration
 from drivers.simulation.model import build_model
 from drivers.simulation.objects import object_model
 from drivers.simulation.plant import Plant
-from drivers.simulation.skin import MOST_PIECES, LARGEST_GAP_m, simplified, skin
+from drivers.simulation.skin import MOST_PIECES, LARGEST_GAP_m, pieces_at_once, simplified, skin
+from drivers.simulation.surfaces import OBJECT, RUBBER, TIP, WOOD, Surface, skin_surfaces, surface
 
 BALL_m = 0.008
 
@@ -104,6 +106,34 @@ def test_a_ball_falls_to_the_bottom_of_a_hollow() -> None:
 
 def test_a_ball_falls_through_a_ring() -> None:
     assert lowest_m(SHAPES["ring"], (0.0, 0.0, 0.05)) < -0.1
+
+
+def sunk_in_m(pieces: Sequence[Array], rubber: Surface, force_N: float) -> float:
+    """How deep a ball that is pressed down sinks into pieces whose top is at 35 mm."""
+    spec = mujoco.MjSpec()
+    for index, corners in enumerate(pieces):
+        spec.add_mesh(name=f"{index}", uservert=corners.ravel())
+        attributes = surface(WOOD, OBJECT, TIP)
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{index}", **attributes)
+    ball = spec.worldbody.add_body(name="ball", pos=(0.002, 0.001, 0.0435))
+    ball.gravcomp = 1
+    ball.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=(0, 0, 1), damping=1.0)
+    ball.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[BALL_m, 0, 0], mass=0.05, **surface(rubber, TIP, OBJECT))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qfrc_applied[0] = -force_N
+    mujoco.mj_step(model, data, 1000)
+    return 0.035 - float(data.body("ball").xpos[2]) + BALL_m
+
+
+def test_a_skin_is_as_soft_as_one_body() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.035)
+    pieces = skin(ball)
+    at_once = pieces_at_once(pieces)
+    assert at_once > 3
+    assert pieces_at_once(skin(SHAPES["block"])) < 2
+    whole_m = sunk_in_m([np.asarray(ball.vertices)], RUBBER, 1.0)
+    assert sunk_in_m(pieces, skin_surfaces(at_once)[0], 1.0) == pytest.approx(whole_m, rel=0.25)
 
 
 def test_a_mesh_stands_on_its_hull(tmp_path: Path) -> None:
