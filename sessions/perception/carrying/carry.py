@@ -32,8 +32,10 @@ _USUAL_NET_N, _PUSHED_SHARE = 0.8, 0.9
 """Net force with which objects are dragged over a table, and which quantile of a carry's is compared with it."""
 _SLIDES_m_s, _SLIDES_N = 0.010, 0.2
 """A fingertip that moves faster than this along the object, and presses more, counts as sliding."""
-_FARTHER = 2.0
-"""Fingertips move the object as far as themselves, or a little farther where it turns."""
+_FARTHER, _TURNS_rad = 2.0, 0.005
+"""Fingertips move the object as far as themselves, or a little farther where it turns, and a hand that turns so fast in
+a step turns it with itself.
+"""
 _NO_HOLD_s = 0.05
 """Contacts may be missed for a few samples."""
 
@@ -162,8 +164,7 @@ class CarryOdometry:
                 slip,
                 steps,
                 balance,
-                self._unseen(steps, balance.centres_m, tilted_rad, resistance.doubt)
-                + np.array([_squeezed_out_m(steps, best), 0.0]),
+                self._unseen(steps, balance.centres_m, tilted_rad, resistance.doubt) + _squeezed_out(steps, best),
             ),
             slip_m=float(np.hypot(*slip[:2])),
             slip_rad=float(abs(slip[2])),
@@ -249,10 +250,15 @@ def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, Continuo
     return np.array([np.linalg.norm(shifts, axis=1) @ doubt, _turns_rad(steps) @ doubt])
 
 
-def _squeezed_out_m(steps: TipSteps, motions: Array) -> float:
-    """How much farther than fingertips go the object goes: contacts that all give way squeeze it out in the balance."""
+def _squeezed_out(steps: TipSteps, motions: Array) -> Array:
+    """How much farther than fingertips go, and turn than the hand turns, the object does, m and rad: contacts that all
+    give way squeeze it out in the balance.
+    """
     tips_m = np.where(steps.felt, np.linalg.norm(steps.moves_m, axis=-1), 0.0).max(axis=1)
-    return float(np.maximum(np.hypot(motions[:, 0], motions[:, 1]) - _FARTHER * tips_m, 0.0).sum())
+    farther_m = np.hypot(motions[:, 0], motions[:, 1]) - _FARTHER * tips_m
+    turns_rad = _turns_rad(steps)
+    more_rad = np.where(turns_rad > _TURNS_rad, np.abs(motions[:, 2]) - _FARTHER * turns_rad, 0.0)
+    return np.array([np.maximum(farther_m, 0.0).sum(), np.maximum(more_rad, 0.0).sum()])
 
 
 def _turns_rad(steps: TipSteps) -> Array:
