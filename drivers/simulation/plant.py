@@ -149,18 +149,23 @@ class Plant:
 
     def link_loads_N(self) -> dict[str, float]:
         """Force of the object on each link of the hand without a sensor, by its name; those that it touches."""
-        loads_N: dict[str, float] = {}
+        forces_N: dict[str, Array] = {}
         for index in range(self._data.ncon):
             pair = [int(geometry) for geometry in self._data.contact[index].geom]
             bodies = [int(self._model.geom_bodyid[geometry]) for geometry in pair]
             others = [g for g, body in zip(pair, bodies, strict=True) if body != self._object]
             if len(others) != 1 or others[0] in self._tips or others[0] == self._table:
                 continue
-            wrench = np.zeros(6)
-            mujoco.mj_contactForce(self._model, self._data, index, wrench)
             link = self._model.body(self._model.geom_bodyid[others[0]]).name
-            loads_N[link] = loads_N.get(link, 0.0) + float(np.linalg.norm(wrench[:3]))
-        return loads_N
+            towards_link = 1.0 if others[0] == pair[1] else -1.0
+            forces_N[link] = forces_N.get(link, np.zeros(3)) + towards_link * self._force_world_N(index)
+        return {link: float(np.linalg.norm(force)) for link, force in forces_N.items()}
+
+    def _force_world_N(self, index: int) -> Array:
+        """Force of the first geometry of a contact on the second, shape (3,)."""
+        wrench = np.zeros(6)
+        mujoco.mj_contactForce(self._model, self._data, index, wrench)
+        return np.asarray(wrench[:3] @ self._data.contact[index].frame.reshape(3, 3))
 
     def _contact(self, index: int) -> TrueContact | None:
         contact = self._data.contact[index]
@@ -168,8 +173,6 @@ class Plant:
         tip, other = (first, second) if first in self._tips else (second, first)
         if tip not in self._tips:
             return None
-        wrench = np.zeros(6)
-        mujoco.mj_contactForce(self._model, self._data, index, wrench)
         frame = contact.frame.reshape(3, 3)  # rows: normal from the first to the second geometry, two tangents
         towards_tip = 1.0 if tip == second else -1.0
         return TrueContact(
@@ -177,7 +180,7 @@ class Plant:
             touched="table" if other == self._table else "object",
             point_world_m=contact.pos.copy(),
             normal_world=towards_tip * frame[0],
-            force_on_tip_world_N=towards_tip * (wrench[:3] @ frame),
+            force_on_tip_world_N=towards_tip * self._force_world_N(index),
             slides_m_s=self._slides_m_s(first, second, contact.pos, frame[1:]),
         )
 

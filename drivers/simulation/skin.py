@@ -63,7 +63,7 @@ def pieces_at_once(pieces: Sequence[Array]) -> float:
     touched = []
     for place in trimesh.sample.sample_surface(surface, _PATCHES, seed=1)[0]:
         near = triangles[np.linalg.norm(middles - place, axis=1) < reach_m]
-        closest = trimesh.triangles.closest_point(near, np.tile(place, (len(near), 1)))
+        closest = trimesh.triangles.closest_point(near, np.tile(place, (len(near), 1)))  # type: ignore[no-untyped-call]
         touched.append(np.count_nonzero(np.linalg.norm(closest - place, axis=1) < _PATCH_m))
     return float(np.mean(touched))
 

@@ -137,10 +137,12 @@ class ForceWatch(NullProgress):
         """Record the truth once per cycle."""
         if link == HAND_LINK:
             grasping = self._phase in ("close", "capture", "squeeze", "re-orient", "release")
-            forces_N: dict[str, float] = defaultdict(float)
-            for contact in self._world.truth().contacts:
-                forces_N[contact.finger] += contact.force_N
-            self._most_N[grasping] = max([self._most_N[grasping], *forces_N.values()])
+            forces_N: dict[str, Array] = defaultdict(lambda: np.zeros(3))
+            for contact in self._world.plant.contacts():
+                if contact.touched == "object":
+                    forces_N[contact.finger] += contact.force_on_tip_world_N
+            loads_N = (float(np.linalg.norm(force)) for force in forces_N.values())
+            self._most_N[grasping] = max([self._most_N[grasping], *loads_N])
             if not grasping:
                 self._most_link_N = max([self._most_link_N, *self._world.plant.link_loads_N().values()])
 
