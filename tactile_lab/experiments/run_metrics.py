@@ -84,7 +84,8 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
 
 def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
     """Stated pose covariances against the truth, in the first grasp's object frame and in the best common one."""
-    truth, poses = data.world_T_body, _modulo_symmetry(data, result.world_T_object)
+    truth, symmetry = data.world_T_body, _symmetry(data)
+    poses, axis_m = _modulo(symmetry, result.world_T_object, truth), round_axis_m(symmetry, truth)
     stated = covariances_in_world(result)
     in_common = covariances_in_world(replace(result, covariances=result.common_covariances or result.covariances))
     figures: dict[str, Any] = {}
@@ -92,7 +93,7 @@ def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
         ("", stated, birth_frame(poses, truth)),
         ("common_", in_common, common_frame(poses, truth)),
     ):
-        judged = pose_consistency(poses, given, truth, frame, round_axis_m(_symmetry(data), truth))
+        judged = pose_consistency(poses, given, truth, frame, axis_m)
         if judged is not None:
             figures |= {
                 f"{name}poses_inside": list(judged.inside),
@@ -104,14 +105,13 @@ def pose_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
 
 def registration_mm(data: SimulatedGrasps, estimate: Poses, dimension: int) -> float | None:
     """Registration error of a trajectory; rotations that no contact can distinguish are ignored."""
-    poses = _modulo_symmetry(data, estimate)
+    poses = _modulo(_symmetry(data), estimate, data.world_T_body)
     contacts = [grasp.points_world_m for grasp in data.grasps]
     return registration_rms_mm(contacts, poses, data.world_T_body, dimension)
 
 
-def _modulo_symmetry(data: SimulatedGrasps, estimate: Poses) -> Poses:
-    found = _symmetry(data)
-    return estimate if found is None else modulo_symmetry(estimate, data.world_T_body, found.order, found.centre_m)
+def _modulo(symmetry: Symmetry | None, estimate: Poses, truth: Poses) -> Poses:
+    return estimate if symmetry is None else modulo_symmetry(estimate, truth, symmetry.order, symmetry.centre_m)
 
 
 def _symmetry(data: SimulatedGrasps) -> Symmetry | None:

@@ -45,6 +45,7 @@ class Hollow:
 
     Attributes:
         body: the model whose outside it has.
+        outside: the body's surface.
         gpis: the field of all contacts.
         wall_m: thickness of the wall.
         rim_m: height of the rim.
@@ -53,6 +54,7 @@ class Hollow:
     """
 
     body: FittedShape
+    outside: SurfaceMesh
     gpis: Gpis
     wall_m: float
     rim_m: float
@@ -89,7 +91,7 @@ class Hollow:
     @cached_property
     def field(self) -> _HollowField:
         """The body without the cavity, as a field."""
-        return _HollowField(self, self.body.mesh(_GRID_m, self.floor_m))
+        return _HollowField(self)
 
 
 class _HollowField:
@@ -98,7 +100,8 @@ class _HollowField:
     sigma_inflation: float = 1.0
     """Predicted variances are those of surfaces already."""
 
-    def __init__(self, shape: Hollow, mesh: SurfaceMesh) -> None:
+    def __init__(self, shape: Hollow) -> None:
+        mesh = shape.outside
         self._shape, self._body = shape, SolidField(mesh, mesh.sigma_m)
         self._walls = _walls(mesh)
         self.contacts_m = np.vstack([shape.gpis.contacts_m, mesh.vertices[mesh.vertices.argmin(axis=0)]])
@@ -148,14 +151,14 @@ def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_
     if not len(low_m):
         return shape
     mesh = shape.mesh(_GRID_m, floor_m)
-    body = SolidField(mesh, 0.0)
+    body, walls = SolidField(mesh, 0.0), _walls(mesh)
     below_m = np.column_stack([low_m[:, :2], np.full(len(low_m), (rim_m + floor_m) / 2)])
     in_cavity = (body.predict(low_m).mean_m < -_INSIDE_m) & (body.predict(below_m).mean_m < -_WITHIN_m)
-    away_m, _ = _from_walls(gpis.contacts_m[up & (heights_m > (rim_m + floor_m) / 2)], *_walls(mesh))
+    away_m, _ = _from_walls(gpis.contacts_m[up & (heights_m > (rim_m + floor_m) / 2)], *walls)
     if not in_cavity.any() or away_m.max() > _THICKNESS_m[1]:
         return shape
-    wall_m = float(np.clip(2 * _from_walls(on_rim_m, *_walls(mesh))[0].mean(), *_THICKNESS_m))
-    hollow = Hollow(shape, gpis, wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
+    wall_m = float(np.clip(2 * _from_walls(on_rim_m, *walls)[0].mean(), *_THICKNESS_m))
+    hollow = Hollow(shape, mesh, gpis, wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
     off_m = np.abs(hollow.field.predict(gpis.contacts_m).mean_m)
     before_m = np.abs(body.predict(gpis.contacts_m).mean_m)
     return hollow if np.sum(off_m > _OFF_m) <= np.sum(before_m > _OFF_m) else shape
