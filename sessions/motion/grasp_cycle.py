@@ -129,7 +129,8 @@ class GraspCycle:
         """
         s = self.settings
         if not (fingers := [finger for finger in hit if finger in self._fingers]):
-            return self.plan.raised(up_m, self._motion.tallest_m - _BELOW_TOP_m)
+            top_m = self._motion.tallest_m or np.inf
+            return self.plan.raised(up_m, top_m - _BELOW_TOP_m)
         if not plan.may_shift:
             return None
         landed.update(fingers)
@@ -206,6 +207,16 @@ class GraspCycle:
         places = [self._motion.tip_centre_world_m(finger, self._hand) for finger in fingers]
         self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
 
+    def _note_landing_from_above(self, guard: Guard, link_m: float) -> None:
+        """Store where the hand landed; links alone, the lowest of which is at ``link_m``, do so between the fingertips,
+        which passed by.
+        """
+        if np.isinf(link_m) or any(finger in self._fingers for finger in guard.met):
+            self._note_landing(guard)
+            return
+        frame = self.plan.frame
+        self.landings_world_m.append(np.array([frame.x_m, frame.y_m, link_m + self._short_of_m()]))
+
     def _come_down(self) -> tuple[str, ...]:
         """Guarded descent, slower from the object's top on, and slowest where links may land on it.
 
@@ -214,14 +225,15 @@ class GraspCycle:
         """
         s, guard, motion, table = self.settings, self._landing, self._motion, self._table()
         hand = table.name, table.height_m, self._hand
+        inside_m = lowest_inside_m(*hand)
         tips_m = max(0.0, motion.tallest_m + s.touch.near_m - open_hand(*hand).lowest_m)
-        links_m = np.clip(motion.tallest_m + _LINKS_NEAR_m - lowest_inside_m(*hand), 0.0, tips_m)
+        links_m = np.clip(motion.tallest_m + _LINKS_NEAR_m - inside_m, 0.0, tips_m)
         for above_m, speed_m_s in ((tips_m, s.descent_m_s), (links_m, s.landing_m_s), (0.0, s.links_landing_m_s)):
             guard.restart()
             if not motion.probe_base(motion.base_joints(self.plan.frame, table, above_m), speed_m_s, guard.is_met):
                 motion.wait(s.rest_s)
                 guard.is_met()
-                self._note_landing(guard)
+                self._note_landing_from_above(guard, inside_m)
                 break
         return guard.met
 

@@ -17,6 +17,7 @@ from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.recording.recorder import Recorder
 from tactile_lab.autonomy.autonomous_roles import hand_shape
 from tactile_lab.autonomy.collision_check import links_are_clear, standing
+from tactile_lab.experiments.thesis.rig_sessions import record
 from tactile_lab.rigs.build import build_runtime
 from tactile_lab.rigs.description import load_rig
 from tests.support.box_shapes import solid_box
@@ -60,3 +61,9 @@ def test_the_hand_comes_down_over_a_cube_of_6_cm_as_far_as_its_links_are_clear(h
     assert bool(links_are_clear([plan], hand_shape(runtime), known)[0]) is clear
     assert moved_m < 0.002
     assert most_N < 1.6
+    assert all(np.linalg.norm(place[:2]) < 0.001 for place in cycle.landings_world_m)
+
+
+def test_a_grasp_whose_links_land_is_done_higher_where_nobody_has_felt_how_tall_the_object_is() -> None:
+    first, second = record("hexagonal-prism", 61, 3, 2).grasps
+    assert min(len(first.touching), len(second.touching)) >= 3
