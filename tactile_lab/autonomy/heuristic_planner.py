@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import transform_points
-from drivers.shadow.closing.closing import PRESHAPES
+from drivers.shadow.closing.closing import PRESHAPES, HIGHEST_m, LOWEST_m
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import ContactHeight, GraspPlan
@@ -61,8 +61,16 @@ class PlanSettings(StrictModel):
 
 _OTHER_YAWS = 12
 _BELOW_TOP_m, _ROOM_m = 0.005, 0.033  # above the fingertips' centres, the lowest proximal link being 33 mm higher
+_JUST_BELOW_TOP_m = 0.010
+"""Fingertips so high meet what is wide at the top, however narrow it is below."""
+
 _TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches
 _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
+
+
+def _fits(height_m: float, top_m: float) -> bool:
+    """Whether fingertips so high are below the top, and what is above them over it."""
+    return height_m + _BELOW_TOP_m < top_m < height_m + _ROOM_m
 
 
 def contact_centre(grasp: Grasp, plan: GraspPlan, form: HandForm = RIGHT_HAND) -> Array:
@@ -151,9 +159,19 @@ class HeuristicPlanner:
         """The next contact height in turn, among those at which the hand has room above the object."""
         heights_m, top_m = self._heights_m, self.top_m
         if top_m is not None:
-            fitting_m = [height_m for height_m in heights_m if height_m + _BELOW_TOP_m < top_m < height_m + _ROOM_m]
-            heights_m = tuple(fitting_m) or (min(heights_m, key=lambda height_m: abs(height_m - top_m)),)
+            fitting_m = tuple(height_m for height_m in heights_m if _fits(height_m, top_m))
+            heights_m = fitting_m or (min(heights_m, key=lambda height_m: abs(height_m - top_m)),)
         return heights_m[(index + index // 4) % len(heights_m)]
+
+    @property
+    def fitting_heights_m(self) -> tuple[float, ...]:
+        """Contact heights at which the hand has room above the object, also just below its top; none if that was not
+        touched.
+        """
+        if (top_m := self.top_m) is None:
+            return ()
+        just_below_m = float(np.clip(top_m - _JUST_BELOW_TOP_m, LOWEST_m, HIGHEST_m))
+        return tuple(height_m for height_m in (*self._heights_m, just_below_m) if _fits(height_m, top_m))
 
     def turn(self, yaw_rad: float) -> float:
         """A re-orientation that keeps the hand in its yaw window."""

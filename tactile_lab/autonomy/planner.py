@@ -20,6 +20,7 @@ from tactile_lab.autonomy.estimated_object import EstimatedObject
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
 from tactile_lab.autonomy.standing.candidate import SideReach
+from tactile_lab.autonomy.standing.empty_closings import EmptyClosings
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp
@@ -88,7 +89,7 @@ class Planner:
         self._for_once = False
         """Whether it plans only one grasp or touch of an object that is otherwise grasped from above."""
 
-        self._blocked, self._standstill = 0, Standstill()
+        self._blocked, self._standstill, self._empty = 0, Standstill(), EmptyClosings()
         self.exhausted = ""
         """Why no action is left, in words; empty while there is one."""
         self.search: Search | None = None
@@ -121,6 +122,9 @@ class Planner:
         if (beside := self._beside(index)) is not None:
             return beside
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
+        if self._touches is not None and (again := self._empty.next(self._rule.fitting_heights_m)) is not None:
+            self._by_estimate = False
+            return again
         if self._standstill.is_reached and (touch := self._standing_planner().touch()) is not None:
             self._standstill = Standstill()
             return touch
@@ -238,6 +242,7 @@ class Planner:
         """Forget what was known of an object that fell over."""
         self._object.is_outdated, self._standstill, self._landings_m = True, Standstill(), []
         self._standing, self._for_once, self._blocked, self._doubted = None, False, 0, False
+        self._empty = EmptyClosings()
         if self._chooser is not None:
             self._chooser.begin_anew()
         self.on_bounding_box(box)
@@ -247,6 +252,8 @@ class Planner:
         """Note where fingertips landed on the object; used until the object is moved."""
         self._landings_m += points_world_m
         self._blocked += bool(points_world_m)
+        if points_world_m:
+            self._empty.on_blocked()
         if self._standing is not None and points_world_m:
             self._standing.on_blocked()
 
@@ -281,6 +288,8 @@ class Planner:
         if self._standing is not None:
             self._standing.on_grasp(grasp)
             self._rule.centre_m = self._standing.middle_m
+        elif self._dimension == 3 and self._rule.top_m is not None:
+            self._empty.on_grasp(grasp, plan)
         if self._standing is not None or plan.only_touch:
             if self._for_once:
                 self._return_above()
@@ -324,7 +333,7 @@ class Planner:
 
     def on_undo(self, hand_motion_world: Pose3) -> None:
         """Note that the last grasp was undone; the motion is the hand odometry since the one before."""
-        self._object.hand_motion, self._doubted = hand_motion_world, False
+        self._object.hand_motion, self._doubted, self._empty = hand_motion_world, False, EmptyClosings()
 
     def on_estimate(self, index: int, is_placed: bool) -> None:
         """Note that grasp number ``index`` has been estimated.

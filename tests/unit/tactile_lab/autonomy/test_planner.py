@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.variance_planner import (
@@ -217,6 +218,48 @@ def test_a_session_goes_on_from_above_when_nothing_beside_the_object_is_left() -
         chooser.on_landings([plan.frame.pose.translation()])
     assert plan.reason in FROM_ABOVE
     assert not chooser.exhausted
+
+
+def felt_on_top(top_m: float) -> Planner:
+    chooser = planner(KnownSlam(None), dimension=3)
+    chooser.on_bounding_box(BoundingBox(Pose2(), np.zeros(2), np.zeros(2), 0.0, top_m, {}, has_sides=False))
+    return chooser
+
+
+def test_fingers_that_met_nothing_close_at_another_height_before_the_top_is_tapped_on() -> None:
+    chooser = felt_on_top(0.07)
+    first = chooser.plan(0)
+    chooser.on_grasp(grasp_at(), first)
+    second = chooser.plan(1)
+    assert (second.frame, second.closing, second.only_touch) == (first.frame, first.closing, False)
+    assert abs(second.height_m - first.height_m) > 0.008
+    chooser.on_grasp(grasp_at(), second)
+    tap = chooser.plan(2)
+    assert tap.only_touch
+    chooser.on_grasp(Grasp(2, 0, (replace(grasp_at("FF").contacts[0], probed=True),), Pose3()), tap)
+    assert chooser.plan(3).reason in FROM_ABOVE
+
+
+def test_a_wide_rim_above_a_waist_is_met_by_fingers_just_below_it() -> None:
+    chooser = felt_on_top(0.07)
+    chooser.on_grasp(grasp_at(), replace(chooser.plan(0), height_m=0.034))
+    assert 0.055 < chooser.plan(1).height_m < 0.065
+
+
+def test_where_the_other_height_is_blocked_or_there_is_none_the_top_is_tapped_on() -> None:
+    chooser = felt_on_top(0.07)
+    chooser.on_grasp(grasp_at(), chooser.plan(0))
+    chooser.on_landings([open_tips_m(chooser.plan(1))[0]])
+    assert chooser.plan(1).only_touch
+    low = felt_on_top(0.02)
+    low.on_grasp(grasp_at(), low.plan(0))
+    assert low.plan(1).only_touch
+
+
+def test_a_top_that_was_never_felt_is_not_tapped_on() -> None:
+    chooser = planner(KnownSlam(None), dimension=3)
+    chooser.on_grasp(grasp_at(), chooser.plan(0))
+    assert chooser.plan(1).reason in FROM_ABOVE
 
 
 def test_estimate_that_missed_the_object_is_doubted_for_one_grasp() -> None:
