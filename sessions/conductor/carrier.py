@@ -73,9 +73,12 @@ class Carrier:
             self._tell(Level.WARNING, f"the object {words}")
 
     def _weigh(self, touching: frozenset[str]) -> bool:
-        """Weigh the held object, if this session can and nobody objects. Returns whether it is still held."""
+        """Weigh the held object, if this session can and nobody objects. Returns whether it is still held.
+
+        Its mass is measured once: a hand's errors are the same every time.
+        """
         roles = self._roles
-        if roles.weigh is None:
+        if roles.weigh is None or self._runtime.perception.properties.mass_kg is not None:
             return True
         if not roles.decisions.may_weigh(roles.performer.plan):
             self._tell(Level.INFO, "the object is not weighed")

@@ -18,7 +18,7 @@ class ConductorSettings(StrictModel):
         grasps: number of grasps.
         fixed_grasps: number of first grasps that follow the fixed rule instead of the estimate.
         missed_approaches: number of blocked approaches in a row that ends the session.
-        weighings: number of first grasps in which the held object is dragged and lifted a little, to weigh it.
+        weighings: number of first grasps in which the held object is dragged and lifted a little, until it is weighed.
         cycle, probing, safety, guided: see there.
     """
 

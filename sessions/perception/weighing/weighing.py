@@ -18,8 +18,10 @@ from sessions.perception.carrying.net_wrench import NetWrench, net_wrench
 _GAIN = 0.01
 """Error of a force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""
 _LEAST_WEIGHT_N = 0.05
-_DRAG_N, _DRAG_SHARE = 0.08, 0.08
-"""Error of a measured friction: an object that has only begun to slide is held back by less."""
+_DRAG_N, _DRAG_SHARE = 0.035, 0.12
+"""Error of a measured friction: an object that has only begun to slide is held back by less, and so is one that turns
+between the fingers.
+"""
 _HELD_BACK_N, _HELD_BACK_SHARE = 0.02, 0.025
 """By how much an object that hangs free seems to be held back: noise, and what inertia and creep make of its weight.
 Errors of the joint angles are the same both ways, and cancel.

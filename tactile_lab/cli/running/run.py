@@ -126,7 +126,7 @@ def run(
             "--weigh",
             min=0,
             max=MOST_GRASPS,
-            help="In the first N grasps, drag the held object to and fro and lift it by 15 mm, to weigh it.",
+            help="In the first N grasps, until it is weighed, drag the held object to and fro and lift it by 15 mm.",
         ),
     ] = 0,
     confirm: Annotated[

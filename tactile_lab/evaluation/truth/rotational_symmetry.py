@@ -3,7 +3,7 @@
 A cylinder rotated by 20 degrees between two grasps feels the same, and so does a hexagonal prism after a sixth of a
 turn. A method cannot follow such rotations, and is not evaluated by them: its poses are rotated towards the true
 heading before contacts are compared. A sixth of a turn is three times the motion noise; a box, with its symmetry of
-half a turn, must be followed.
+half a turn, must be followed. A ball has such rotations about every axis, and rolls when it is let go.
 """
 
 from __future__ import annotations
@@ -49,6 +49,13 @@ def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
     return largest_order(stays, _FEWEST)
 
 
+def ball_centre_m(mesh: trimesh.Trimesh) -> Array | None:
+    """Centre of an object that every rotation leaves unchanged, to a millimetre RMS, shape (3,); None for others."""
+    centre_m = np.asarray(mesh.bounds.mean(axis=0))
+    radii_m = np.linalg.norm(sample_mesh(mesh, _POINTS) - centre_m, axis=1)
+    return centre_m if radii_m.std() < _ALIKE_m else None
+
+
 def outline_symmetry(outline_m: Array) -> Symmetry | None:
     """The same for an outline in the plane, shape (n, 2), with its axis; None if its rotations can be distinguished."""
     found = symmetry_of(Contour(outline_m, np.zeros(len(outline_m)), is_closed=True))
@@ -82,6 +89,26 @@ def modulo_symmetry(
             pose = Pose3(rotation, pose.transformFrom(axis_m) - rotation.rotate(axis_m))
         turned.append(pose)
     return tuple(turned)
+
+
+def modulo_rotations(estimate: Poses, world_T_object: Poses, centre_m: Array) -> tuple[Pose3 | None, ...]:
+    """Estimated poses of a ball, rotated about its centre as it is rotated in truth.
+
+    Args:
+        estimate: estimated poses, None if unknown.
+        world_T_object: true poses, None if unknown.
+        centre_m: of the ball, true object frame, shape (3,); by the estimates it is where it is in the mean.
+    """
+    pairs = list(zip(estimate, world_T_object, strict=True))
+    places_m = [pose.transformTo(truth.transformFrom(centre_m)) for pose, truth in pairs if pose and truth]
+    if not places_m:
+        return tuple(estimate)
+    middle_m = np.mean(places_m, axis=0)
+
+    def rotated(pose: Pose3, truth: Pose3) -> Pose3:
+        return Pose3(truth.rotation(), pose.transformFrom(middle_m) - truth.rotation().rotate(middle_m))
+
+    return tuple(rotated(pose, truth) if pose and truth else pose for pose, truth in pairs)
 
 
 def round_axis_m(symmetry: Symmetry | None, world_T_object: Poses) -> Array | None:

@@ -14,7 +14,8 @@ from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.experiments.studies.solids import EVERYDAY_SCANS, scans_left_out
 
 _OTHER_MASSES_kg = (0.05, 1.0, 2.0)
-_WEIGHED_MASSES_kg = (0.1, 0.2, 0.3, 0.4)
+_WEIGHED_MASSES_kg = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6)
+_WEIGHINGS = 3
 
 
 def _carried(grasps: int) -> list[Setting]:
@@ -104,5 +105,5 @@ WEIGHING = Experiment(
     ),
     ranges("object", "mass off, %", "worst_mass_off", lambda cell: f"{cell['mass_kg']} kg"),
     pooled=("object",),
-    grasps=1,
+    grasps=_WEIGHINGS,
 )

@@ -37,6 +37,7 @@ class Bench:
         end=LiftEnd.HUNG,
         slipped=None,
         heard=None,
+        mass_kg=None,
     ):
         self.done, self.told, self.logged, self.motions = [], [], [], []
         cycle = SimpleNamespace(
@@ -54,7 +55,7 @@ class Bench:
             weigh=(lambda touching: self.done.append("weigh") or end) if can_weigh else None,
             forecast=lambda grasp, turn, shift: self.done.append("forecast") or forecast,
         )
-        properties = SimpleNamespace(in_words=lambda: "mass 300 g")
+        properties = SimpleNamespace(in_words=lambda: "mass 300 g", mass_kg=mass_kg)
         runtime = SimpleNamespace(
             perception=SimpleNamespace(carry=carry, heard_slip=heard, properties=properties, hand_motion_world=FELT),
             log=lambda level, source, text: self.logged.append(text),
@@ -101,6 +102,12 @@ def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
     refused = Bench(may_weigh=False).carry(weighed=True)
     assert "weigh" not in refused.done
     assert refused.told == [(Level.INFO, "the object is not weighed")]
+
+
+def test_what_has_been_weighed_is_not_weighed_again_and_nobody_is_asked():
+    bench = Bench(mass_kg=0.3, may_weigh=False).carry(weighed=True)
+    assert bench.done == ["forecast", "squeeze", "squeeze", "re-orient", "re-orient"]
+    assert bench.told == []
 
 
 @pytest.mark.parametrize("may_weigh", [False, True])

@@ -23,10 +23,18 @@ from tactile_lab.evaluation.consistency.surfaces import surface_consistency
 from tactile_lab.evaluation.files.plain import json_text, plain, read_json_object
 from tactile_lab.evaluation.files.properties_file import PROPERTIES, read_measured, write_properties
 from tactile_lab.evaluation.prism import open_ring, prism, signed_area_m2, triangulate
+from tactile_lab.evaluation.registration import registration_rms_mm
 from tactile_lab.evaluation.spread import Interval, Spread, number, quantile
 from tactile_lab.evaluation.sweep import SweepRow, SweepRun, markdown_table, planned_runs, summaries
 from tactile_lab.evaluation.table import evaluation_rows, further_text, one_draw
-from tactile_lab.evaluation.truth.rotational_symmetry import modulo_symmetry, outline_symmetry, stands, symmetry_turns
+from tactile_lab.evaluation.truth.rotational_symmetry import (
+    ball_centre_m,
+    modulo_rotations,
+    modulo_symmetry,
+    outline_symmetry,
+    stands,
+    symmetry_turns,
+)
 from tactile_lab.evaluation.truth.time_alignment import Track, clock_offset
 from tests.support.baseline import assert_baseline
 
@@ -285,6 +293,27 @@ def test_rotations_that_leave_an_object_unchanged() -> None:
     told["stands"] = [stands(pose) for pose in lying]
     told["lying"] = [pose and pose.matrix()[:2] for pose in modulo_symmetry(ours, [*truth[:3], lying[3]], 6)]
     assert_baseline("evaluation/symmetry", told, rtol=1e-5, atol=1e-6)
+
+
+def test_a_ball_that_rolls_is_followed_by_its_centre() -> None:
+    centre_m = np.array([0.01, 0.0, 0.03])
+    ball = trimesh.creation.icosphere(3, 0.03).apply_translation(centre_m)
+    found_m = ball_centre_m(ball)
+    assert found_m is not None
+    assert np.allclose(found_m, centre_m, atol=1e-4)
+    assert ball_centre_m(trimesh.creation.cylinder(0.03, 0.06)) is None
+
+    truth, estimate = [], []
+    for n in range(4):
+        rolled = Rot3.RzRyRx(0.2 * n, 0.1 * n, 0.0)
+        place_m = np.array([0.1 + 0.02 * n, -0.01 * n, 0.03])
+        truth.append(Pose3(rolled, place_m - rolled.rotate(centre_m)))
+        estimate.append(Pose3(Rot3.Yaw(0.5 * n), place_m + np.array([0.0, 0.001 * (-1) ** n, 0.0])))
+    points_m = [pose.transformFrom(centre_m) + 0.03 * np.eye(3) for pose in truth]
+    told = modulo_rotations([*estimate, None], [*truth, truth[0]], centre_m)
+    assert told[-1] is None
+    assert registration_rms_mm(points_m, told[:-1], truth, 3) == pytest.approx(1.0, abs=0.05)
+    assert modulo_rotations([None], truth[:1], centre_m) == (None,)
 
 
 def test_solids_of_outlines() -> None:
