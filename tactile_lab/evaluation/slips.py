@@ -17,7 +17,14 @@ from gtsam import Pose3
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
 from tactile_lab.evaluation.felt_slips import FeltSlips
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, deviation, planar_motion, pose_vector
+from tactile_lab.slam.tracking.contacts.motion import (
+    UNHELD,
+    MotionNoise,
+    compose,
+    deviation,
+    planar_motion,
+    pose_vector,
+)
 from tactile_lab.slam.tracking.evidence.motion_cost import STIFF_BEYOND_SIGMA
 
 LEAST_STEPS = 10
@@ -72,12 +79,12 @@ class Slips:
     def motion(self) -> MotionNoise | None:
         """The matching motion noise; None if the hand carried the object too rarely.
 
-        ``unheld`` stays 1, which is always safe, if the object was left in place too rarely.
+        ``unheld`` stays as it is on every rig, :data:`UNHELD`, if the object was left in place too rarely.
         """
         if len(self.carried) < LEAST_STEPS:
             return None
         translation_m, rotation_rad = root_mean_squares(self.carried)
-        share = 1.0
+        share = UNHELD
         if len(self.left) >= LEAST_STEPS:
             usual_m = float(np.quantile(lengths_m(self.left), _USUAL_SHARE)) / _SIGMAS_OF_LENGTH
             usual_rad = float(np.quantile(np.abs(self.left[:, 2]), _USUAL_SHARE)) / _SIGMAS_OF_TURN

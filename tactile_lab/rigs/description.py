@@ -24,7 +24,7 @@ from sessions.perception.perception import PerceptionSettings
 from sessions.recording.session import Session
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.rigs.wires import Wires
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.motion import UNHELD, MotionNoise
 
 OTHER_VERSION = "Use the version of tactile-lab that recorded it; tactile-lab session show names it"
 """Advice for a recorded description that does not fit this version."""
@@ -32,6 +32,12 @@ OTHER_VERSION = "Use the version of tactile-lab that recorded it; tactile-lab se
 
 _KINDS: Mapping[str, Registry[Any]] = {"fingertips": FINGERTIPS, "positioner": POSITIONERS}
 """Keys that determine the meaning of other keys."""
+
+
+class RigMotion(MotionNoise):
+    """How far objects slip on a rig, where nobody but the hand moves what stands there; see :class:`MotionNoise`."""
+
+    unheld: float = Field(default=UNHELD, gt=0, le=1)
 
 
 class CalibrationFiles(StrictModel):
@@ -114,7 +120,7 @@ class RigDescription(StrictModel):
     base: SerializeAsAny[StrictModel] = StrictModel()
     perception: PerceptionSettings = PerceptionSettings()
     conductor: SessionSettings = SessionSettings()
-    motion: MotionNoise = MotionNoise()
+    motion: RigMotion = RigMotion()
     simulation: SimulationSettings = SimulationSettings()
 
     @property

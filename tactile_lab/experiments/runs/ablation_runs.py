@@ -23,6 +23,7 @@ from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.experiments.touched_metrics import touched_figures
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.tracking.contacts.motion import UNHELD
 
 Overlay: TypeAlias = Mapping[str, Mapping[str, Any]]
 _Result = TypeVar("_Result")
@@ -48,8 +49,6 @@ GRASPS: Mapping[str, int] = MappingProxyType(
 )
 CARRIED_BEFORE, FARTHEST_m = 8, 0.15
 """Grasp before which somebody puts the object elsewhere, and by how much at most per axis; it is also turned."""
-UNHELD = 0.15
-"""Share of the motion's noise that applies to an object that was left in place, as rig ``sim`` has it."""
 CHECK_EVERY = 5
 """Seeds that are divisible by this are run again even where a mechanism changed nothing."""
 

@@ -21,6 +21,10 @@ _TAIL = 3.0
 """Half of the degrees of freedom and dimensions of the distribution of measured steps."""
 _LEAST_m, _LEAST_rad = 1e-5, 1e-4
 
+UNHELD = 0.15
+"""Usual share of a carried object's slip that is left where nothing but the closing hand may have moved it (decision
+30)."""
+
 
 class MotionNoise(StrictModel):
     """Standard deviations of the object's slip relative to the hand's motion, per re-orientation.

@@ -12,6 +12,7 @@ from drivers.core.contacts import Grasp, StepSigma
 from drivers.core.poses import spatial
 from tactile_lab.evaluation.felt_slips import FeltSlips
 from tactile_lab.evaluation.slips import LEAST_STEPS, Slips
+from tactile_lab.slam.tracking.contacts.motion import UNHELD
 
 
 def grasp(index: int, hand_motion: Pose2) -> Grasp:
@@ -60,13 +61,13 @@ def test_the_motion_that_fits_is_the_one_that_slips_were_drawn_with() -> None:
     assert 24 <= slips.pushed_count(motion) <= 33
 
 
-def test_too_few_steps_tell_nothing_and_an_object_seldom_left_is_not_said_to_lie_still() -> None:
+def test_too_few_steps_tell_nothing_and_an_object_seldom_left_is_said_to_lie_as_still_as_usual() -> None:
     rng = np.random.default_rng(6)
     carried = [(Pose2(0.03, 0.0, 0.5), slip) for slip in drawn(rng, LEAST_STEPS, 0.006, 0.15)]
     assert Slips.between(*session(carried[1:])).motion is None
     found = Slips.between(*session([*carried, (Pose2(), Pose2())])).motion
     assert found is not None
-    assert found.unheld == 1.0
+    assert found.unheld == UNHELD
 
 
 def test_an_object_that_never_moves_is_not_said_to_lie_as_still_as_a_rock() -> None:

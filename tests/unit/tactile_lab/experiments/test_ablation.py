@@ -24,7 +24,6 @@ from tactile_lab.experiments.runs.ablation_runs import (
     PLANE,
     SPACE,
     THINGS,
-    UNHELD,
     WITHOUT,
     WRONG,
     settings,
@@ -35,7 +34,7 @@ from tactile_lab.slam.shape.fields.settings import GpisSettings, ShapePart
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.motion import UNHELD, MotionNoise
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanism, Mechanisms
 

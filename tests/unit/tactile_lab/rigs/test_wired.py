@@ -24,6 +24,7 @@ from tactile_lab.rigs.build import build_interpreter, check_calibration
 from tactile_lab.rigs.description import Rig, load_rig, shipped_rigs
 from tactile_lab.rigs.laboratory import WiredLaboratory
 from tactile_lab.rigs.wired import emulation_plan, hand_form, hand_setup, with_form
+from tactile_lab.slam.tracking.contacts.motion import UNHELD
 from tests.support.wire_rig import SHIPPED, wire_rig
 
 SIMULATED = SHIPPED / "calibrations" / "simulated-hand"
@@ -225,3 +226,8 @@ def test_an_emulated_laboratory_that_could_not_keep_up_says_so(tmp_path: Path) -
     assert place(0.0).remarks() == ()
     (remark,) = place(1.26).remarks()
     assert remark == "the emulated laboratory stalled for 1260 ms in all: this computer is too slow or too busy"
+
+
+@pytest.mark.parametrize("rig", ["sim", "sim-biotac", "sim-wire", "sim-ur"])
+def test_what_the_hand_left_in_place_is_expected_there_on_every_rig(rig: str) -> None:
+    assert load_rig(rig).description.motion.unheld == UNHELD
