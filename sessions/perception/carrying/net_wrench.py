@@ -41,11 +41,13 @@ class NetWrench:
         force_N: shape (n, 3).
         moment_Nm: about the palm's origin, shape (n, 3).
         palm_m: the palm's origin, shape (n, 3).
+        tips_m: origins of the fingertips' frames, shape (n, tips, 3).
     """
 
     force_N: Array
     moment_Nm: Array
     palm_m: Array
+    tips_m: Array
 
 
 def net_wrench(
@@ -72,7 +74,8 @@ def net_wrench(
         force_N += force
         moment_Nm += np.cross(frames[:, at, :3, 3] - palm_m, force)
         moment_Nm -= np.einsum("nij,nj->ni", rotations, felt[:, 3:])
-    return NetWrench(force_N, moment_Nm, palm_m)
+    tips_m = frames[..., :3, 3][:, [FINGERS.index(finger) for finger in fingertips]]
+    return NetWrench(force_N, moment_Nm, palm_m, tips_m)
 
 
 def tip_loads_N(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> Array:

@@ -117,7 +117,8 @@ def hanging(
         for turn in turned[[name.startswith(finger) for name in JOINTS]]
     ]
     spread = np.square(np.array(others) - best).sum(axis=0)
-    sigma = np.sqrt(spread + _drift(fingertips, best[0]) ** 2)
+    centre_m = np.append(best[1:3], height_m)
+    sigma = np.sqrt(spread + _drift(fingertips, best[0], found.tips_m.mean(axis=0) - centre_m) ** 2)
     return Hanging(
         weight_N=float(best[0]),
         weight_sigma_N=float(np.hypot(sigma[0], _GAIN * best[0])),
@@ -153,12 +154,20 @@ def _measured(
     return np.array([force[2], palm[0] + x, palm[1] + y, force[0], force[1]])
 
 
-def _drift(fingertips: Mapping[str, ContinuousFingertip], weight_N: float) -> Array:
-    """Standard deviations by the drift of the sensors since their tare; shape and order of :func:`_measured`."""
-    drifts = np.array([tip.drift for tip in fingertips.values()]).reshape(-1, 6)
-    force_N, moment_Nm = (float(np.sqrt(np.square(drifts[:, part]).sum() / 3)) for part in (slice(0, 3), slice(3, 6)))
-    lever_m = (moment_Nm + 0.1 * force_N) / max(weight_N, _LEAST_WEIGHT_N)
-    return np.array([force_N, lever_m, lever_m, force_N, force_N])
+def _drift(fingertips: Mapping[str, ContinuousFingertip], weight_N: float, arms_m: Array) -> Array:
+    """Standard deviations by the drift of the sensors since their tare; shape and order of :func:`_measured`.
+
+    Args:
+        fingertips: by finger.
+        weight_N: of the object.
+        arms_m: from its centre, at the height of the contacts, to each fingertip, shape (tips, 3).
+    """
+    drifts = np.array([tip.drift for tip in fingertips.values()]).reshape(-1, 2, 3)
+    by_N, by_Nm = np.square(drifts).mean(axis=2).T
+    force_N = float(np.sqrt(by_N.sum()))
+    levers = [by_N @ (arms_m[:, axis] ** 2 + arms_m[:, 2] ** 2) + by_Nm.sum() for axis in (0, 1)]
+    lever_m = np.sqrt(levers) / max(weight_N, _LEAST_WEIGHT_N)
+    return np.array([force_N, *lever_m, force_N, force_N])
 
 
 def _held_back_N(wrench: NetWrench, quantile: float = 0.5) -> float:
