@@ -26,11 +26,10 @@ from drivers.simulation.surfaces import (
     GLASS,
     HAND,
     OBJECT,
+    RUBBER,
     TABLE,
     TIP,
     WOOD,
-    Surface,
-    skin_surfaces,
     surface,
 )
 
@@ -94,11 +93,10 @@ def build_model(
     _add_table(spec, rolling=target.rolls)
     forearm = _add_positioner(spec, world_T_mount)
     links = _add_links(forearm, form)
-    rubber, wood = skin_surfaces(target.pieces_at_once)
     for finger in form.fingers:
-        _add_tip(spec, links[f"{finger}J1"], finger, tips[finger], rubber)
+        _add_tip(spec, links[f"{finger}J1"], finger, tips[finger])
     _add_motors(spec, form)
-    _add_object(spec, target, object_mass_kg, wood)
+    _add_object(spec, target, object_mass_kg)
     return spec.compile()
 
 
@@ -213,7 +211,7 @@ def _geometry(shape: Shape) -> dict[str, Any]:
             return {"type": mujoco.mjtGeom.mjGEOM_ELLIPSOID, "pos": shape.centre_m, "size": shape.semi_axes_m}
 
 
-def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody, rubber: Surface) -> None:
+def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody) -> None:
     """Add the fingertip as a separate body, welded to the distal link through the force sensor."""
     name = f"{finger} tip"
     body = distal.add_body(name=name)
@@ -226,7 +224,7 @@ def _add_tip(spec: Any, distal: Any, finger: str, tip: TipBody, rubber: Surface)
         type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
         size=tip.semi_axes_m,
         **_place(tip.distal_T_skin),
-        **surface(rubber, TIP, OBJECT | TABLE),
+        **surface(RUBBER, TIP, OBJECT | TABLE),
     )
     body.add_site(name=name, **_place(tip.distal_T_sensor))
     body.add_site(name=f"{finger} distal")
@@ -265,11 +263,11 @@ def _add_distal_tendons(spec: Any, finger: str) -> None:
         tendon.wrap_joint(f"{finger}J2", share_of_j2)
 
 
-def _add_object(spec: Any, target: ObjectModel, mass_kg: float, wood: Surface) -> None:
+def _add_object(spec: Any, target: ObjectModel, mass_kg: float) -> None:
     body = spec.worldbody.add_body(name="object", pos=[0, 0, target.rest_height_m])
     body.add_freejoint(name="object")
     _set_inertia(body, target, mass_kg)
-    touched = surface(wood, OBJECT | FOOT if target.hull is None else OBJECT, HAND | TIP)
+    touched = surface(WOOD, OBJECT | FOOT if target.hull is None else OBJECT, HAND | TIP)
     for index, piece in enumerate(target.pieces):
         body.add_geom(name=f"object {index}", **_piece_geometry(spec, piece, f"object piece {index}"), **touched)
     if target.hull is not None:

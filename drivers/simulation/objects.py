@@ -19,7 +19,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ConfigurationError
 from drivers.simulation.mesh_object import load_resting_mesh
 from drivers.simulation.object_names import MESH_PREFIX
-from drivers.simulation.skin import pieces_at_once, skin
+from drivers.simulation.skin import skin
 
 _CURVE_SEGMENTS = 64  # chord error 0.06 mm on the largest curve
 _SPHERE_SUBDIVISIONS = 4  # 0.03 mm on a 35 mm sphere
@@ -87,7 +87,6 @@ class ObjectModel:
         rolls: whether the object can roll, so that the contact model needs rolling friction.
         scanned: whether the underside is as uneven as a scan, so that the physics must settle it into its resting pose.
         hull: on which an object stands whose pieces are only a skin; None for another.
-        pieces_at_once: how many of a skin's pieces a fingertip touches on average.
         changes: what was done to the mesh of a file, as sentences.
     """
 
@@ -99,7 +98,6 @@ class ObjectModel:
     rolls: bool = False
     scanned: bool = False
     hull: Hull | None = None
-    pieces_at_once: float = 1.0
     changes: tuple[str, ...] = ()
 
     @property
@@ -227,7 +225,6 @@ def _scan(name: str) -> ObjectModel:
     """
     loaded = load_resting_mesh(name)
     mesh = loaded.mesh
-    felt = skin(mesh)
     hull = Hull(np.asarray(mesh.convex_hull.vertices, float))
     lowest = mesh.bounds[0, 2]
     near_table = mesh.vertices[mesh.vertices[:, 2] < lowest + _FOOT_LAYER_m, :2]
@@ -235,14 +232,13 @@ def _scan(name: str) -> ObjectModel:
     marker = _largest_marker(foot, lowest)
     return ObjectModel(
         name,
-        tuple(map(Hull, felt)),
+        tuple(map(Hull, skin(mesh))),
         mesh,
         foot,
         marker,
         rolls=True,
         scanned=True,
         hull=hull,
-        pieces_at_once=pieces_at_once(felt),
         changes=loaded.changes,
     )
 

@@ -14,8 +14,8 @@ class TouchSettings(StrictModel):
     """How the hand touches without grasping.
 
     Attributes:
-        tap_m_s: speed of the hand coming down on the top; a thumb, stiff in that direction, reaches 0.8 N, at 35 mm/s
-            1.5 N.
+        tap_m_s: speed of the hand coming down on the top; a thumb, stiff in that direction, reaches 0.8 N, at 18
+            mm/s 1.1 N, at 35 mm/s 1.5 N.
         near_m: from so far above a top that is known on the hand comes down slowly.
         met_N: force on a fingertip that ends the approach.
         force_N: force that every fingertip is then brought to.
@@ -41,7 +41,7 @@ class TouchSettings(StrictModel):
             forearm lets it come no lower; from higher up it would tip objects over.
     """
 
-    tap_m_s: float = Field(default=0.018, gt=0.0)
+    tap_m_s: float = Field(default=0.014, gt=0.0)
     near_m: float = Field(default=0.02, ge=0.0)
     met_N: float = Field(default=0.20, gt=0.0)
     force_N: float = Field(default=0.35, gt=0.0)
@@ -114,7 +114,7 @@ class CycleSettings(StrictModel):
     clearance_m: float = Field(default=0.03, ge=0.0)
     standoff_m: float = Field(default=0.13, gt=0.0)
     descent_m_s: float = Field(default=0.05, gt=0.0)
-    landing_m_s: float = Field(default=0.018, gt=0.0)
+    landing_m_s: float = Field(default=0.014, gt=0.0)
     links_landing_m_s: float = Field(default=0.006, gt=0.0)
     beside_m_s: float = Field(default=0.05, gt=0.0)
     approach_m_s: float = Field(default=0.03, gt=0.0)
