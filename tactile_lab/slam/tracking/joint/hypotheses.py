@@ -116,6 +116,12 @@ class HypothesisScorer:
                 return contact_map, self._misfit(contact_map)
             contact_map = contact_map.without_contact(*contact_map.origins[asked[costs.argmax()]])
 
+    def rough_cost(self, contact_map: ContactMap) -> float:
+        """Cost of a map, roughly: each contact is explained by all others or by nothing, none is left out for it."""
+        each = contact_map.fit().leave_one_out_costs(np.arange(len(contact_map.contacts)))
+        motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
+        return motion + float(np.minimum(each, self._unexplained_cost).sum()) + self.price(contact_map)
+
     def _asked_grasps(self, contact_map: ContactMap, grasp: int | None) -> NDArray[np.bool_]:
         """Which grasps' contacts may be left out, shape (g,)."""
         sure = [one.contacts_world.by_touch and one.was_left(self._noise) for one in contact_map.placed]

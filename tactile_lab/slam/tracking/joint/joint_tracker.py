@@ -24,6 +24,7 @@ from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.faces.resolved_errors import with_errors_resolved
 from tactile_lab.slam.tracking.filter.particle_filter import PoseEstimate
 from tactile_lab.slam.tracking.joint.branching import Branching
+from tactile_lab.slam.tracking.joint.crossed_readings import crossed_readings
 from tactile_lab.slam.tracking.joint.deferred_association import Relocate, propose_pushes, relocate_last
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer, cost, likeliest, weights
 from tactile_lab.slam.tracking.joint.mechanisms import Mechanisms
@@ -210,7 +211,7 @@ class JointTracker:
         """
         readable = len(self.map.placed) > 2 and len(self.map.placed[-1].contacts_world) > 0
         if self._settings.backwards and not self._has_settled and readable:
-            self._hypotheses = self._scorer.different(self._hypotheses + self._backwards())
+            self._hypotheses = self._scorer.different(self._hypotheses + self._read_again())
         opinions = SecondOpinions(self._scorer, self._noise, self._settings, self.mechanisms, self._relocate)
         self._hypotheses = opinions.splice_best(self._hypotheses)
         for _ in range(2):
@@ -240,6 +241,12 @@ class JointTracker:
 
     def _push(self, best: Hypothesis) -> list[Hypothesis]:
         return propose_pushes(best, self._noise, self._settings.proposals, self._scorer)
+
+    def _read_again(self) -> list[Hypothesis]:
+        """The session read backwards, and joined with the session as it was read."""
+        backwards = self._backwards()
+        readings = self.map, min(backwards, key=cost).map
+        return backwards + crossed_readings(*readings, self._scorer, self._settings.proposals)
 
     def _backwards(self) -> list[Hypothesis]:
         """The hypotheses of the same grasps in the opposite order."""
