@@ -19,6 +19,11 @@ from drivers.core.contacts import Array
 _JERK_ns = 250_000_000
 """A motion starts with a jerk, as long on every rig: readings until then are not judged."""
 
+_APART_ns = 8_000_000
+"""What is heard sooner than so long after the last reading is averaged into the next one: a hand that answers 500 or
+1000 times a second shows its controllers' noise in single readings, and what follows counts readings of one that
+answers 100 times."""
+
 _SIGMAS, _LEAST_COUNTS = 8.0, 250.0
 _READINGS = 2
 """In a row: a lone one is no touch. A positioner that gets a target late jerks, and the wrist with it. A motor is read
@@ -52,6 +57,9 @@ class LinkWatch:
         """A new even motion begins."""
         self._began_ns: int | None = None
         self._newest: tuple[int, Array] | None = None
+        self._heard_ns: int | None = None
+        self._since: list[Array] = []
+        """What was heard since the newest reading."""
         self._readings: deque[Array] = deque(maxlen=_COMPARED)
         self._far, self._off = 0, np.zeros(len(self._counts), dtype=int)
         """Readings in a row in which any motor is far off; and for each motor, in which it is off at all."""
@@ -73,8 +81,14 @@ class LinkWatch:
             torques: counts of all motors, shape (20,), None if the hand reports none.
             stamp_ns: when it arrived. A reading that was judged before is not a second one that says so.
         """
-        if torques is None or stamp_ns is None or (self._newest is not None and stamp_ns == self._newest[0]):
+        if torques is None or stamp_ns is None or stamp_ns == self._heard_ns:
             return
+        self._heard_ns = stamp_ns
+        self._since.append(torques)
+        if self._newest is not None and stamp_ns - self._newest[0] < _APART_ns:
+            return
+        torques = np.mean(self._since, axis=0)
+        self._since.clear()
         before = torques if self._newest is None else self._newest[1]
         self._newest = stamp_ns, torques
         if self._began_ns is None:

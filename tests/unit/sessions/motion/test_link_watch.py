@@ -113,6 +113,19 @@ def test_a_motor_that_stands_still_tells_nothing_of_lone_jerks() -> None:
     assert cycle_of_a_push(0.0, jerks=(26, 27, 100, 101, 150)) is None
 
 
+def test_a_hand_that_answers_500_times_a_second_tells_pushes_and_nothing_of_its_controllers_noise() -> None:
+    """Its joints' controllers differentiate noise over a shorter time: bursts of some readings, but not of 30 ms."""
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
+    burst, told = np.zeros(20), []
+    for cycle in range(2000):
+        if cycle % 4 == 0:
+            burst = np.where(rng.random(20) < 0.003, 80.0, 0.0)
+        watch.take(counts(rng, 60.0 if cycle >= 1500 else 0.0) + burst, cycle * CYCLE_ns // 5)
+        if watch.pushed.any():
+            told.append(cycle)
+    assert 1505 <= told[0] <= 1520
+
+
 def test_a_hand_without_strain_gauges_tells_nothing() -> None:
     watch = LinkWatch(WRIST)
     assert not any(is_touched(watch, None, stamp * CYCLE_ns) for stamp in range(50))
