@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from drivers.shadow.closing.closing import Closing
+from drivers.shadow.closing.closing import Closing, closing, side_with_first_finger_down, sideways
 from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.closing.tip_motion import motor_rates
 
@@ -52,6 +52,22 @@ TAP_HEIGHT_m = 0.022
 """Height of the closing's table; the positioner adds the rest."""
 
 _HELD_BACK_m = 0.010
+
+_PALM_m = 0.055
+"""The upright palm stays so far above the table: the forearm behind it is 100 mm thick."""
+
+
+def lowest_touch_m(side: str, heights_m: tuple[float, float], hand: HandShape) -> float:
+    """How low the lowest fingertip of the column may be.
+
+    Args:
+        side: where the palm stands, one of :data:`~drivers.shadow.closing.closing.SIDES`.
+        heights_m: with the first finger down, and up; higher for a hand that has fewer fingers below its palm then.
+        hand: that touches.
+    """
+    height_m = heights_m[0 if side == side_with_first_finger_down(hand.form) else 1]
+    palm_m = float(closing(sideways(COLUMN.closing, side), height_m, hand).grasp_T_palm.z())
+    return height_m + max(0.0, _PALM_m - palm_m)
 
 
 def lowest_ahead(table: Closing, hand: HandShape, up_to_m: float) -> Pattern:

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from drivers.core.contacts import Array
-from drivers.shadow.closing.closing import Closing, closing, side_with_first_finger_down, sideways
+from drivers.shadow.closing.closing import Closing, closing, sideways
 from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.closing.tip_motion import motor_rates
 from sessions.motion.cycle_settings import CycleSettings, TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.guard import Guard
 from sessions.motion.motion import Motion
-from sessions.motion.probing.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m, lowest_ahead
+from sessions.motion.probing.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m, lowest_ahead, lowest_touch_m
 from sessions.motion.travel import travel_height_m
 from sessions.perception.approach_paths import TipSurface
 
@@ -130,8 +130,8 @@ class Toucher:
             What was touched, perhaps nothing; None where the hand could not come down.
         """
         s, motion = self.settings, self._motion
-        lowest_m = s.side_heights_m[0 if side == side_with_first_finger_down(self._hand.form) else 1]
-        table = closing(sideways(COLUMN.closing, side), height_m or lowest_m, self._hand)
+        height_m = height_m or lowest_touch_m(side, s.side_heights_m, self._hand)
+        table = closing(sideways(COLUMN.closing, side), height_m, self._hand)
         lane, column = frame.shifted_inside(np.array([-s.row_m, 0.0])), lowest_ahead(table, self._hand, all_up_to_m)
         known, past_m = len(motion.runtime.perception.probed), s.beyond_m if beyond_m is None else beyond_m
         self._poise(table, column, lane, from_m)

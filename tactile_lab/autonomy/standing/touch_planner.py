@@ -7,18 +7,18 @@ would rather slide than tip.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from drivers.core.contacts import FINGERS, Array
+from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, closing, sideways
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.side_survey import LOW_m
-from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m
+from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m, lowest_touch_m
 from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
 from tactile_lab.autonomy.standing.side_planner import slides
@@ -96,7 +96,8 @@ class TouchPlanner(ActionPlanner):
     def _sides(self) -> Iterator[StandingCandidate]:
         """Every side that the arm can come to, in lanes, at heights where the object is not tipped over."""
         for yaw_rad in self.felt.yaws(self.yaw_window_rad, _ASKEW_rad):
-            for side, lowest_m in zip(SIDES, self.settings.side_heights_m, strict=True):
+            for side in SIDES:
+                lowest_m = lowest_touch_m(side, self.settings.side_heights_m, self.hand)
                 yield from self._on_side(yaw_rad, sideways(COLUMN.closing, side), lowest_m)
 
     def _on_side(self, yaw_rad: float, name: str, lowest_m: float) -> Iterator[StandingCandidate]:
@@ -110,18 +111,18 @@ class TouchPlanner(ActionPlanner):
             front = lane - box.way_out_m(lane, -way) * way
             frame = GraspFrame(float(front[0]), float(front[1]), yaw_rad)
             for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m):
-                touches = _touched(front, float(height_m), box.size_m[2])
+                touches = _touched(front, float(height_m), box.size_m[2], self.hand.form.long_fingers)
                 if slides(max(float(place[2]) for place in touches.values()), half_m):
                     yield self._candidate(frame, name, float(height_m), touches, "one side touched")
 
 
-def _touched(front_m: Array, height_m: float, top_m: float) -> dict[str, Array]:
+def _touched(front_m: Array, height_m: float, top_m: float, fingers: Sequence[str]) -> dict[str, Array]:
     """Where fingertips one above the other meet a side: all that are low; else the lowest, which is ahead."""
-    heights_m = height_m + _FINGERS_APART_m * np.arange(4)
+    heights_m = height_m + _FINGERS_APART_m * np.arange(len(fingers))
     met_m = heights_m[heights_m < min(LOW_m, top_m)]
     if not len(met_m):
         met_m = heights_m[:1]
-    return {finger: np.array([*front_m, z]) for finger, z in zip(FINGERS, met_m, strict=False)}
+    return {finger: np.array([*front_m, z]) for finger, z in zip(fingers, met_m, strict=False)}
 
 
 def _places(half_m: float, apart_m: float) -> Array:

@@ -9,14 +9,20 @@ from gtsam import Pose2, Pose3
 from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
+from drivers.shadow.model.hand_form import HandForm
+from drivers.shadow.model.motors import DRIVEN_JOINTS
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.motion.safety import SafetySettings
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
 
 TIP = HandShape()
+LEFT = HandForm("left", DRIVEN_JOINTS)
+LITE = HandForm("right", tuple(name for name in DRIVEN_JOINTS if name[:2] not in ("LF", "WR")))
+"""Three fingers and a thumb, on an arm in place of a wrist."""
 WINDOW_rad = (-1.31, 1.31)
 
 
@@ -54,6 +60,15 @@ def test_a_wide_box_is_tapped_all_over_and_touched_all_around_until_nothing_is_n
     assert np.ptp(inside[:, 1]) > 0.10
     aside = {one.plan.closing for one in done if closing(one.plan.closing, one.plan.height_m, TIP).is_sideways}
     assert aside == {"pinch-from-left", "pinch-from-right"}
+
+
+@pytest.mark.parametrize("hand", [TIP, HandShape(form=LEFT), HandShape(form=LITE)], ids=["right", "left", "lite"])
+def test_the_palm_of_every_hand_stays_above_the_table_and_fingers_it_lacks_touch_nothing(hand: HandShape) -> None:
+    done = carry_out(TouchPlanner(felt(top_m=0.12), hand, WINDOW_rad, SideReach()))
+    aside = [one for one in done if closing(one.plan.closing, one.plan.height_m, hand).is_sideways]
+    palms_m = [closing(one.plan.closing, one.plan.height_m, hand).grasp_T_palm.z() for one in aside]
+    assert min(palms_m) > SafetySettings().palm_minimum_height_m + 0.004
+    assert all(set(one.touches) <= set(hand.form.fingers) for one in done)
 
 
 def test_every_expected_place_lies_on_the_box() -> None:
