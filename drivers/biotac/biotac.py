@@ -160,16 +160,25 @@ class BioTac:
     def contact(self, world_R_distal: Array) -> TipContact | None:
         """The contact from the channels' means since :meth:`begin_capture`.
 
-        None before a tare, if no usable sensor answers, if some channel was not received during the capture, or if the
-        pressure does not show contact.
+        None before a tare, if no usable sensor answers, if some channel was not received during the capture, if the
+        pressure does not show contact, or if no electrode is squeezed.
         """
+        return None if (changes := self._captured_changes()) is None else self._contact(*changes)
+
+    def pressed_N(self) -> float | None:
+        """Force of the touch since :meth:`begin_capture`, by the pressure, which tells also what meets the skin lightly
+        or away from all electrodes; None where :meth:`contact` has none for another reason.
+        """
+        return None if (changes := self._captured_changes()) is None else self._force_N(*changes)
+
+    def _captured_changes(self) -> tuple[float, Array] | None:
+        """Means of pressure and electrodes since :meth:`begin_capture`, against the tare; None without a touch."""
         if self._tare_pdc is None or not self.channels.fitted or not self.channels.captured:
             return None
         pdc_rise = float(self.channels.captured_means((Channel.PDC,))[0]) - self._tare_pdc
-        change = self.channels.captured_means(self._electrodes) - self._tare_electrodes
         if pdc_rise <= self.calibration.touch_pdc_counts or sum(self._touches) < self._settings.touch_samples:
             return None
-        return self._contact(pdc_rise, change)
+        return pdc_rise, self.channels.captured_means(self._electrodes) - self._tare_electrodes
 
     def newest_contact(self) -> TipContact | None:
         """The contact from the newest readings alone; None before a tare and if no electrode is squeezed."""

@@ -136,6 +136,14 @@ class FingertipSensor(Protocol):
         """Problems of the sensor as text; empty if there are none."""
 
 
+@runtime_checkable
+class PressureFingertip(Protocol):
+    """A fingertip that feels a touch also where it cannot tell the place."""
+
+    def pressed_N(self) -> float | None:
+        """Force of the touch since ``begin_capture``; None without one."""
+
+
 class RigidTransform(StrictModel):
     """A mounting: translation in metres, then fixed-axis roll, pitch, yaw in radians (Rz Ry Rx)."""
 

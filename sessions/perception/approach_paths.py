@@ -55,6 +55,18 @@ class TipSurface:
         return np.asarray((world_T_distal @ self.distal_T_tip.matrix())[:3, 3])
 
 
+def way_of(tip: TipSurface, begun: Array, ended: Array) -> Array | None:
+    """The direction in which a fingertip moved, world frame, shape (3,); None if it hardly did.
+
+    Args:
+        tip: its surface.
+        begun, ended: its distal frame in the world before and after, shape (4, 4).
+    """
+    way = tip.centre(ended) - tip.centre(begun)
+    length_m = float(np.linalg.norm(way))
+    return None if length_m < _LEAST_WAY_m else way / length_m
+
+
 def approach_paths(
     begun: Array, ended: Array, tips: Mapping[str, TipSurface], contacts: Iterable[Contact]
 ) -> tuple[ApproachPath, ...]:
@@ -71,10 +83,9 @@ def approach_paths(
         if finger not in tips:
             continue
         tip = tips[finger]
-        way = tip.centre(end) - tip.centre(start)
-        if (length_m := float(np.linalg.norm(way))) < _LEAST_WAY_m:
+        if (ahead := way_of(tip, start, end)) is None:
             continue
-        first = tip.leading_point(start, way / length_m)
-        last = touched[finger] if finger in touched else tip.leading_point(end, way / length_m)
+        first = tip.leading_point(start, ahead)
+        last = touched[finger] if finger in touched else tip.leading_point(end, ahead)
         found.append(ApproachPath(finger, first, last, finger in touched))
     return tuple(found)

@@ -10,11 +10,15 @@ import numpy as np
 
 from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact
 from drivers.core.errors import SessionDataError
-from drivers.core.fingertip import FingertipSensor, TipContact
-from sessions.perception.approach_paths import TipSurface, approach_paths
+from drivers.core.fingertip import FingertipSensor, PressureFingertip, TipContact
+from sessions.perception.approach_paths import TipSurface, approach_paths, way_of
 from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.hand_placement import HandPlacement
 from sessions.recording.session_events import SessionEvent
+
+_UNPLACED_m, _UNPLACED_ACROSS_m, _UNPLACED_rad = 0.0015, 0.004, 0.6
+"""Standard deviations of a contact whose place on the fingertip is not felt: along the fingertip's way, across it, and
+of its normal. It may be anywhere on the half of the tip that went ahead."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +139,8 @@ class TouchCapture:
     def _valid_touches(self, geometry: HandGeometry, *, heard: bool) -> dict[str, TipContact]:
         tips, self.dropped = {}, {}
         for finger, fingertip in self._fingertips.items():
-            tip = fingertip.contact(geometry.world_T_distal[FINGERS.index(finger), :3, :3])
+            world_T_distal = geometry.world_T_distal[FINGERS.index(finger)]
+            tip = fingertip.contact(world_T_distal[:3, :3]) or self._foremost(finger, fingertip, world_T_distal)
             if tip is None:
                 self.dropped[finger] = "no contact"
             elif not heard:
@@ -146,6 +151,27 @@ class TouchCapture:
                 tips[finger] = tip
         self.drop_counts.update(self.dropped.values())
         return tips
+
+    def _foremost(self, finger: str, fingertip: FingertipSensor, world_T_distal: Array) -> TipContact | None:
+        """The contact of a fingertip that is pressed but cannot tell where: foremost on its way. None for others."""
+        begun, surface = self._closing_start, self._tip_surfaces.get(finger)
+        if begun is None or surface is None or not isinstance(fingertip, PressureFingertip):
+            return None
+        ahead_world = way_of(surface, begun.world_T_distal[FINGERS.index(finger)], world_T_distal)
+        if ahead_world is None or (force_N := fingertip.pressed_N()) is None:
+            return None
+        distal_R_world = world_T_distal[:3, :3].T
+        ahead = distal_R_world @ ahead_world
+        along = np.outer(ahead, ahead)
+        return TipContact(
+            point_distal_m=distal_R_world
+            @ (surface.leading_point(world_T_distal, ahead_world) - world_T_distal[:3, 3]),
+            normal_distal=-ahead,
+            point_covariance_m2=_UNPLACED_m**2 * along + _UNPLACED_ACROSS_m**2 * (np.eye(3) - along),
+            normal_sigma_rad=_UNPLACED_rad,
+            force_N=force_N,
+            torsion_Nm=0.0,
+        )
 
     def _ways(self, geometry: HandGeometry, contacts: tuple[Contact, ...]) -> tuple[ApproachPath, ...]:
         """Approach paths of this grasp; a second capture after the same closing has none."""

@@ -114,9 +114,9 @@ class FakeTip:
         return (self.fault,) if self.fault else ()
 
 
-def make_perception(*, force_N=0.7, **options):
+def make_perception(*, force_N=0.7, tip=FakeTip, **options):
     return Perception(
-        wrench_fingertips={finger: FakeTip(finger, force_N) for finger in FINGERS},
+        wrench_fingertips={finger: tip(finger, force_N) for finger in FINGERS},
         mount_T_forearm=mount_T_forearm,
         world_T_mount=options.pop("world_T_mount", Pose3(Rot3.Yaw(0.3), np.array([0.1, -0.2, 0.5]))),
         settings=options.pop("settings", PerceptionSettings()),

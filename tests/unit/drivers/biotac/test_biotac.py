@@ -219,6 +219,19 @@ def test_a_touch_becomes_a_contact_in_the_distal_frame(tip: BioTac) -> None:
     assert math.sqrt(spread) < math.sqrt(np.linalg.eigvalsh(contact.point_covariance_m2)[-1]) / 2
 
 
+def test_a_touch_away_from_all_electrodes_has_a_force_but_no_place(tip: BioTac) -> None:
+    finger = Finger(tip)
+    finger.feed(REST)
+    tip.tare(UPRIGHT)
+    tip.begin_capture()
+    finger.feed(REST)
+    assert tip.pressed_N() is None
+    tip.begin_capture()
+    finger.feed(REST | {Channel.PDC: 1760})
+    assert tip.contact(UPRIGHT) is None
+    assert tip.pressed_N() == pytest.approx(0.3, rel=0.05)
+
+
 def test_before_a_tare_nothing_is_known_to_touch(tip: BioTac) -> None:
     layout, finger = electrode_layout(19), Finger(tip)
     tip.begin_capture()

@@ -12,7 +12,7 @@ from drivers.core.contacts import FINGERS, Contact
 from drivers.shadow.model.kinematics import JOINTS
 from sessions.perception.approach_paths import TipSurface, approach_paths
 from sessions.recording.session_events import EventKind, SessionEvent
-from tests.support.session_fakes import FakeBaseSample, FakeHandSample, make_perception
+from tests.support.session_fakes import FakeBaseSample, FakeHandSample, FakeTip, make_perception
 
 TIP = TipSurface.upright((0.0085, 0.0085, 0.013), (0.0, 0.0, 0.019))
 TIPS = dict.fromkeys(FINGERS, TIP)
@@ -104,3 +104,29 @@ def test_one_closing_belongs_to_one_grasp_and_none_was_told_before_it():
     perception.event(SessionEvent(EventKind.CLOSE_BEGIN, 0))
     assert len(capture(perception, ["FF"]).approach_paths) == 5
     assert capture(perception, ["FF"]).approach_paths == ()
+
+
+class LightlyPressed(FakeTip):
+    """Feels that it is pressed, and not where."""
+
+    def contact(self, world_R_distal):
+        return None
+
+    def pressed_N(self):
+        return 0.3 if self.finger == "MF" else None
+
+
+def test_a_fingertip_that_is_pressed_and_cannot_tell_where_touches_with_what_went_ahead():
+    perception = make_perception(tip=LightlyPressed, tip_surfaces=TIPS)
+    hear(perception, OPEN_rad)
+    perception.event(SessionEvent(EventKind.CLOSE_BEGIN, 0))
+    begun = perception.hand.world_T_distal["MF"]
+    (found,) = capture(perception, ["MF"]).contacts
+    ended = perception.hand.world_T_distal["MF"]
+    ahead = TIP.centre(ended.matrix()) - TIP.centre(begun.matrix())
+    ahead /= np.linalg.norm(ahead)
+    np.testing.assert_allclose(found.point_world_m, TIP.leading_point(ended.matrix(), ahead), atol=1e-9)
+    np.testing.assert_allclose(found.normal_world, -ahead, atol=1e-9)
+    assert np.sqrt(ahead @ found.point_covariance_m2 @ ahead) < 0.003
+    assert np.sqrt(np.linalg.eigvalsh(found.point_covariance_m2)[-1]) > 0.0039
+    assert found.force_N == 0.3
