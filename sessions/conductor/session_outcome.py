@@ -42,3 +42,8 @@ class SessionOutcome:
     dropped: dict[str, int]
     error: TactileLabError | None = None
     properties: ObjectProperties = field(default_factory=ObjectProperties)
+
+    def raise_if_interrupted(self) -> None:
+        """Raises KeyboardInterrupt where a person interrupted the session: one of many, it is made again."""
+        if self.ending is Ending.INTERRUPTED:
+            raise KeyboardInterrupt

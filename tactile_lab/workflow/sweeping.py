@@ -53,8 +53,8 @@ def run_for_sweep(
     """
     request = SessionRequest(rig, run.object_name, root, method, run.dimension, run.seed, grasps)
     finished = run_session(request, NullProgress())
-    if finished.outcome is not None and finished.outcome.ending is Ending.INTERRUPTED:
-        raise KeyboardInterrupt  # of the sweep: it is to run again
+    if finished.outcome is not None:
+        finished.outcome.raise_if_interrupted()
     if finished.evaluation is None:
         raise SessionError(finished.problem, where=str(finished.folder))
     if check_replay:

@@ -159,9 +159,11 @@ def watch_carries(
     runtime.connect()
     try:
         roles = autonomous_roles(runtime, slam, settings, seed=seed, dimension=2)
-        return Conductor(runtime, settings, roles, watch).run(), watch
+        outcome = Conductor(runtime, settings, roles, watch).run()
     finally:
         runtime.close()
+    outcome.raise_if_interrupted()
+    return outcome, watch
 
 
 def _lying(scan: str) -> str:

@@ -61,6 +61,7 @@ def explore_by_hand(cell: Cell) -> dict[str, Any]:
         outcome = Conductor(runtime, conductor, roles, Watch(world, monitor)).run()
     finally:
         runtime.close()
+    outcome.raise_if_interrupted()
     return {**monitor.figures(slam.finish()), "status": monitor.status(str(outcome.ending))}
 
 

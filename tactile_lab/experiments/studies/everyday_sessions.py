@@ -106,6 +106,7 @@ def explore_everyday(cell: Cell) -> dict[str, Any]:
         outcome = Conductor(runtime, conductor, roles, watch).run()
     finally:
         runtime.close()
+    outcome.raise_if_interrupted()
     result = slam.finish()
     figures = {**_ending(outcome), **watch.figures(), "cpu_minutes": (time.process_time() - began_s) / 60}
     return {**figures, **judge_model(result, outcome.grasps, watch, dimension)}

@@ -107,6 +107,7 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
         outcome = Conductor(runtime, conductor, roles, watch).run()
     finally:
         runtime.close()
+    outcome.raise_if_interrupted()
     count = min(len(outcome.grasps), len(watch.truth))
     done, truth, moved = tuple(outcome.grasps[:count]), tuple(watch.truth[:count]), tuple(watch.palm_motions[:count])
     return RigSession(world.object_model.mesh, done, truth, moved)
