@@ -47,6 +47,7 @@ def test_known_poses_place_a_solid_too() -> None:
     assert registration_mm(data, result) < 1e-6
 
 
+@pytest.mark.long
 def test_known_poses_keep_the_contacts_inside_a_cup() -> None:
     """A field that has seen the outside first has no room for a wall of 4 mm, and leaves the inside out."""
     data = spatial_data.simulate("cup", 7, count=24, motion_scale=0.1, heights="all")
