@@ -25,8 +25,7 @@ from tactile_lab.evaluation.shape import (
 from tactile_lab.evaluation.trajectory import compared_grasps, estimate_T_truth
 from tactile_lab.evaluation.truth.rotational_symmetry import (
     ORIGIN_m,
-    ball_centre_m,
-    modulo_rotations,
+    modulo_mesh_symmetry,
     modulo_symmetry,
     outline_symmetry,
     symmetry_turns,
@@ -81,12 +80,11 @@ class EstimateWithTruth:
         """Order of that symmetry; None if there is none or the true shape is unknown."""
         return None if self.symmetry is None else self.symmetry.order
 
-    @property
+    @cached_property
     def poses_modulo_symmetry(self) -> tuple[Pose3 | None, ...]:
         """The estimated poses, turned by symmetries of the object towards the true heading; a ball's as it rolled."""
-        ball_m = None if self.truth.mesh is None else ball_centre_m(self.truth.mesh)
-        if ball_m is not None:
-            return modulo_rotations(self.poses, self.truth.world_T_object, ball_m)
+        if self.truth.mesh is not None:
+            return modulo_mesh_symmetry(self.poses, self.truth.world_T_object, self.truth.mesh, self.symmetry_turns)
         centre_m = ORIGIN_m if self.symmetry is None else self.symmetry.centre_m
         return modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns, centre_m)
 

@@ -111,6 +111,22 @@ def modulo_rotations(estimate: Poses, world_T_object: Poses, centre_m: Array) ->
     return tuple(rotated(pose, truth) if pose and truth else pose for pose, truth in pairs)
 
 
+def modulo_mesh_symmetry(
+    estimate: Poses, world_T_object: Poses, mesh: trimesh.Trimesh, turns: int | None
+) -> tuple[Pose3 | None, ...]:
+    """Estimated poses of a mesh, turned by its symmetries towards the true heading; a ball's as it rolled.
+
+    Args:
+        estimate: estimated poses, None if unknown.
+        world_T_object: true poses, None if unknown.
+        mesh: of the object.
+        turns: see :func:`symmetry_turns`.
+    """
+    if (ball_m := ball_centre_m(mesh)) is not None:
+        return modulo_rotations(estimate, world_T_object, ball_m)
+    return modulo_symmetry(estimate, world_T_object, turns)
+
+
 def round_axis_m(symmetry: Symmetry | None, world_T_object: Poses) -> Array | None:
     """Where the axis of a round object is in its own frame, shape (2,); None if it is not round, or does not always
     stand upright.

@@ -23,12 +23,7 @@ from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.evaluation.registration import registration_rms_mm
-from tactile_lab.evaluation.truth.rotational_symmetry import (
-    ball_centre_m,
-    modulo_rotations,
-    modulo_symmetry,
-    symmetry_turns,
-)
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_mesh_symmetry, symmetry_turns
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
@@ -149,11 +144,7 @@ def judge(session: RigSession, result: SlamResult) -> dict[str, Any]:
         shape = contour_figures(result.contour, true_outline(mesh))
     else:
         shape = mesh_figures(result.mesh, mesh)
-    ball_m = ball_centre_m(mesh)
-    if ball_m is None:
-        poses = modulo_symmetry(result.world_T_object, truth, symmetry_turns(mesh))
-    else:
-        poses = modulo_rotations(result.world_T_object, truth, ball_m)
+    poses = modulo_mesh_symmetry(result.world_T_object, truth, mesh, symmetry_turns(mesh))
     contacts = [grasp.points_world_m for grasp in session.grasps]
     return {
         **shape,
