@@ -16,7 +16,6 @@ from drivers.core.contacts import Array, Grasp, StepSigma
 from drivers.core.poses import planar
 from drivers.simulation.object_names import LYING, MESH_PREFIX, in_pose
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import SessionOutcome
 from sessions.motion.probing.box_prober import ProbingSettings
@@ -29,6 +28,7 @@ from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.data.solids import YCB_PREFIX, ycb_path
 from tactile_lab.experiments.data.spoilt_samples import AS_MEASURED, SPOILT, spoil
+from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam.tactile_slam import TactileSlam
@@ -156,14 +156,8 @@ def watch_carries(
     runtime.observer.interpreter.listener = watch.on_sample
     slam = TactileSlam(slam_settings("odometry", 2, rig.description.motion), seed)
     settings = _by_rule(rig, grasps, weighings, top=is_scan)
-    runtime.connect()
-    try:
-        roles = autonomous_roles(runtime, slam, settings, seed=seed, dimension=2)
-        outcome = Conductor(runtime, settings, roles, watch).run()
-    finally:
-        runtime.close()
-    outcome.raise_if_interrupted()
-    return outcome, watch
+    roles = autonomous_roles(runtime, slam, settings, seed=seed, dimension=2)
+    return run_unrecorded(runtime, settings, roles, watch), watch
 
 
 def _lying(scan: str) -> str:

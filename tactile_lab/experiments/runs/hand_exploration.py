@@ -14,7 +14,6 @@ from typing import Any
 
 from drivers.core.clock import NANOSECONDS
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.recording.recorder import NullRecorder
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
@@ -22,6 +21,7 @@ from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.runs.coverage_monitor import CoverageMonitor, UntilExplored
+from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
@@ -52,16 +52,11 @@ def explore_by_hand(cell: Cell) -> dict[str, Any]:
     world = simulated_world(rig, cell.seed, cell["object"])
     runtime = build_runtime(rig, world, NullRecorder())
     slam, conductor = estimation(rig, cell), conductor_settings(rig, cell)
-    runtime.connect()
-    try:
-        roles = autonomous_roles(runtime, slam, conductor, seed=cell.seed, dimension=dimension)
-        shape = partial(roles.estimator.ask, SlamService.known_shape)
-        monitor = CoverageMonitor(world.object_model.mesh, slam, shape, dimension, int(cell["actions"]))
-        roles = replace(roles, decisions=UntilExplored(roles.estimator, monitor))
-        outcome = Conductor(runtime, conductor, roles, Watch(world, monitor)).run()
-    finally:
-        runtime.close()
-    outcome.raise_if_interrupted()
+    roles = autonomous_roles(runtime, slam, conductor, seed=cell.seed, dimension=dimension)
+    shape = partial(roles.estimator.ask, SlamService.known_shape)
+    monitor = CoverageMonitor(world.object_model.mesh, slam, shape, dimension, int(cell["actions"]))
+    roles = replace(roles, decisions=UntilExplored(roles.estimator, monitor))
+    outcome = run_unrecorded(runtime, conductor, roles, Watch(world, monitor))
     return {**monitor.figures(slam.finish()), "status": monitor.status(str(outcome.ending))}
 
 

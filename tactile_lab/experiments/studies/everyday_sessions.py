@@ -24,7 +24,6 @@ from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar, rotation_angle_rad, spatial, transform_points
 from drivers.simulation.object_names import MESH_PREFIX, in_pose
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.perception.interpreter import HAND_LINK
@@ -39,6 +38,7 @@ from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_P
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
 from tactile_lab.experiments.runs.reachable import ANY_YAW_rad
+from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, known_share, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import load_rig
@@ -100,13 +100,8 @@ def explore_everyday(cell: Cell) -> dict[str, Any]:
     runtime.observer.interpreter.listener = watch.on_sample
     slam = TactileSlam(slam_settings("joint", dimension, rig.description.motion), cell.seed)
     conductor = rig.description.conductor.model_copy(update={"grasps": int(cell["grasps"])})
-    runtime.connect()
-    try:
-        roles = autonomous_roles(runtime, slam, conductor, seed=cell.seed, dimension=dimension)
-        outcome = Conductor(runtime, conductor, roles, watch).run()
-    finally:
-        runtime.close()
-    outcome.raise_if_interrupted()
+    roles = autonomous_roles(runtime, slam, conductor, seed=cell.seed, dimension=dimension)
+    outcome = run_unrecorded(runtime, conductor, roles, watch)
     result = slam.finish()
     figures = {**_ending(outcome), **watch.figures(), "cpu_minutes": (time.process_time() - began_s) / 60}
     return {**figures, **judge_model(result, outcome.grasps, watch, dimension)}

@@ -16,7 +16,6 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Grasp
 from drivers.simulation.world import SimulatedWorld
-from sessions.conductor.conductor import Conductor
 from sessions.conductor.progress import NullProgress
 from sessions.recording.recorder import NullRecorder
 from sessions.rig_runtime.rig_runtime import RigRuntime
@@ -27,6 +26,7 @@ from tactile_lab.evaluation.truth.rotational_symmetry import modulo_mesh_symmetr
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
+from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam.result import SlamResult
@@ -96,13 +96,8 @@ def record(object_name: str, seed: int, dimension: int, grasps: int) -> RigSessi
     watch = _TruthWatch(world, runtime)
     slam = TactileSlam(slam_settings(_WHILE_RECORDING, dimension, rig.description.motion), seed)
     conductor = by_rule(rig, grasps)
-    runtime.connect()
-    try:
-        roles = autonomous_roles(runtime, slam, conductor, seed=seed, dimension=dimension)
-        outcome = Conductor(runtime, conductor, roles, watch).run()
-    finally:
-        runtime.close()
-    outcome.raise_if_interrupted()
+    roles = autonomous_roles(runtime, slam, conductor, seed=seed, dimension=dimension)
+    outcome = run_unrecorded(runtime, conductor, roles, watch)
     count = min(len(outcome.grasps), len(watch.truth))
     done, truth, moved = tuple(outcome.grasps[:count]), tuple(watch.truth[:count]), tuple(watch.palm_motions[:count])
     return RigSession(world.object_model.mesh, done, truth, moved)
