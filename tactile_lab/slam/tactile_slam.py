@@ -38,6 +38,7 @@ from drivers.core.observability import observability, planar_observability
 from drivers.core.one_thread import on_one_thread
 from tactile_lab.slam.current_shape import CurrentShape
 from tactile_lab.slam.doubt.assessment import Assessment, assess
+from tactile_lab.slam.doubt.heights import side_heights_m
 from tactile_lab.slam.doubt.rivals import displaced
 from tactile_lab.slam.doubt.status import Alternative
 from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
@@ -126,6 +127,9 @@ class TactileSlam:
         """Contacts of grasps before the object frame, while the object stays where it is."""
 
         self._steps: list[SlamStep] = []
+        self._heights_m: Array = np.empty(0)
+        """Of the contacts of an outline so far, over the table."""
+
         self._shape = CurrentShape(self._settings, self._settings.shape_model)
         self._has_ended = False
 
@@ -158,6 +162,8 @@ class TactileSlam:
         if grasp.begins_anew:
             self._begin_anew()
         contacts = ContactSet.of_grasp(grasp, self._settings.dimension, self._origin_height_m)
+        if self._settings.dimension == 2:
+            self._heights_m = np.append(self._heights_m, side_heights_m(grasp))
         if self._tracker is None:
             return self._begin(grasp, started)
         self._tracker.predict(self._space.motion(grasp.hand_motion_world), grasp.motion_sigma)
@@ -270,6 +276,7 @@ class TactileSlam:
             self._refused,
             lost=self.is_lost,
             origin_height_m=self._origin_height_m,
+            heights_m=self._heights_m,
             has_ended=self._has_ended,
         )
 
@@ -304,6 +311,7 @@ class TactileSlam:
 
     def _begin_anew(self) -> None:
         self._tracker, self._origin_height_m, self._waiting = None, 0.0, ()
+        self._heights_m = np.empty(0)
         self._shape = CurrentShape(self._settings, self._settings.shape_model)
 
     def _begin(self, grasp: Grasp, started: float) -> SlamStep:

@@ -13,6 +13,9 @@ from drivers.simulation.objects import object_height_m
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.rigs.description import Rig
 
+_MORE_PICTURES = 4
+"""After one without the marker: a small one is seen now and then."""
+
 
 def check_fits(rig: Rig, object_name: str) -> None:
     """Refuse an object of known shape that the hand would run into on its way, or that it cannot feel.
@@ -34,7 +37,7 @@ def check_fits(rig: Rig, object_name: str) -> None:
 
 
 def marker_problem(runtime: RigRuntime, rig: Rig, markers: MarkerSettings) -> str:
-    """Why the session would have no true poses, as a sentence, by a picture taken now; empty where it will.
+    """Why grasps of the session would have no true pose, as a sentence, by pictures taken now; empty where they will.
 
     Args:
         runtime: connected.
@@ -43,19 +46,30 @@ def marker_problem(runtime: RigRuntime, rig: Rig, markers: MarkerSettings) -> st
     """
     if runtime.camera is None or "camera" not in rig.files:
         return ""
+    tracker = ObjectTracker(load_camera(rig.files["camera"]), markers)
     try:
-        picture = runtime.picture()
+        if not (problem := _unseen(runtime, tracker)):
+            return ""
+        seen = [_unseen(runtime, tracker) for _ in range(_MORE_PICTURES)].count("")
     except DeviceError as error:
         return f"the camera gave no picture before the first grasp: {error}"
-    assert isinstance(picture, Frame)
-    problem = ObjectTracker(load_camera(rig.files["camera"]), markers).observe(picture).problem
-    if not problem:
-        return ""
-    return (
-        f"the camera cannot locate the object: {problem}. Grasps made like this have no true pose. The marker "
-        f"under the object has a side of {_mm(markers.object_side_m)}: use a larger one, bring it into the picture, or "
-        "clean the table"
+    return f"{_how_often(seen, problem)}. The marker under the object has a side of {_mm(markers.object_side_m)}: " + (
+        "use a larger one, bring it into the picture, or clean the table"
     )
+
+
+def _unseen(runtime: RigRuntime, tracker: ObjectTracker) -> str:
+    """Why a picture does not show where the object is; empty if it does. Raises DeviceError."""
+    picture = runtime.picture()
+    assert isinstance(picture, Frame)
+    return tracker.observe(picture).problem
+
+
+def _how_often(seen: int, problem: str) -> str:
+    if seen == 0:
+        return f"the camera cannot locate the object: {problem}. Grasps made like this have no true pose"
+    shown = f"in {seen} of {_MORE_PICTURES + 1} pictures: {problem} in the others"
+    return f"the camera locates the object {shown}. Some grasps may have no true pose"
 
 
 def _mm(length_m: float) -> str:

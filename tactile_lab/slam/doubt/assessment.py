@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from drivers.core.contacts import Array
 from tactile_lab.slam.doubt.halves import exchanged
+from tactile_lab.slam.doubt.heights import many_heights
 from tactile_lab.slam.doubt.known_part import REACH_ALONE_m, REACH_m, known_part, with_guesses_told
 from tactile_lab.slam.doubt.missing_parts import missing_parts
 from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, turned_by_symmetry
@@ -56,6 +58,7 @@ def assess(
     *,
     lost: bool,
     origin_height_m: float,
+    heights_m: Array,
     has_ended: bool = True,
 ) -> Assessment:
     """Assess an estimate.
@@ -67,6 +70,7 @@ def assess(
         refused: of every grasp, whether it could not be placed.
         lost: whether the object could not be followed.
         origin_height_m: height of the object frame's origin over the table.
+        heights_m: of the contacts of an outline over the table, shape (n,); none of a surface.
         has_ended: no grasp follows. Before, only the trajectories that are still kept count as alternatives; at the
             end more are searched for.
     """
@@ -94,6 +98,7 @@ def assess(
         *_few(len(refused) - sum(refused)),
         *unknown_sizes(shape),
         *missing,
+        *many_heights(heights_m),
         *(
             [Doubt("symmetry", symmetry.words, grave=False)]
             if symmetry is not None and symmetry.interchangeable

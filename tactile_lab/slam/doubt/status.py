@@ -30,6 +30,7 @@ DoubtName: TypeAlias = Literal[
     "unknown-size",
     "missing-part",
     "rivals",
+    "many-heights",
     "symmetry",
 ]
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import trimesh
 
+from drivers.camera.aruco import ObjectTracker
 from drivers.core.errors import ConfigurationError
 from drivers.simulation.settings import ObjectStart
 from sessions.recording.recorder import NullRecorder
@@ -61,3 +63,10 @@ def test_a_marker_outside_the_picture_is_told_before_the_session() -> None:
     assert problem_at(0.0) == ""
     assert "marker 7 is not visible" in (said := problem_at(0.4))
     assert "side of 35 mm" in said
+
+
+def test_a_marker_that_is_seen_now_and_then_is_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = "its marker 7 is not visible"
+    answers = iter([problem, "", problem, "", problem])
+    monkeypatch.setattr(ObjectTracker, "observe", lambda tracker, frame: SimpleNamespace(problem=next(answers)))
+    assert f"locates the object in 2 of 5 pictures: {problem} in the others" in problem_at(0.0)
