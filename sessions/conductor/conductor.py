@@ -88,6 +88,8 @@ class Conductor:
             return None
         self._phase("bounding box")
         box = self._survey(lambda: self._guard.requested)
+        if box is None:
+            return None
         self._decisions.on_bounding_box(box)
         self._tell(Level.INFO, box.in_words())
         if box.is_found or self._guard.requested:

@@ -167,7 +167,7 @@ class SessionRoles:
         forecast: predicts a carry by a turn (radians, about the vertical) and a shift (metres, world), and fits the
             force of the fingers to it; None for a session that cannot.
         survey: measures the object's bounding box before the first grasp; its argument returns whether to skip the
-            rest. None for a session without it.
+            rest. It returns None where a person does without, and is None for a session that cannot.
         find: the same for an object that may not be where it was, with the places and the height of a
             :class:`~sessions.conductor.estimator.Search`.
         guard: receives Ctrl+C while the session runs; code that waits for a person checks it.
@@ -179,7 +179,7 @@ class SessionRoles:
     estimator: EstimatorClient
     weigh: Callable[[frozenset[str]], LiftEnd] | None = None
     forecast: Callable[[Grasp, float, Array], Forecast | None] | None = None
-    survey: Callable[[Callable[[], bool]], BoundingBox] | None = None
+    survey: Callable[[Callable[[], bool]], BoundingBox | None] | None = None
     find: Callable[[Callable[[], bool], Array, float | None], BoundingBox] | None = None
     guard: InterruptGuard = field(default_factory=InterruptGuard)
 

@@ -12,6 +12,7 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
+from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
@@ -19,6 +20,7 @@ from sessions.guided.operator import Ask, Request, Stage
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.travel import travel_height_m
 from sessions.recording.recorder import Level
 
 AROUND_m = 0.001
@@ -53,15 +55,21 @@ class GraspByKeys(GraspCycle):
 
     def descend(self, plan: GraspPlan) -> bool:
         self._free_the_hand()
-        prompt = "Move the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
-        self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
+        if closing(plan.closing, plan.height_m, self._hand).is_sideways:
+            prompt = "The hand comes from the object's side. g: go as suggested"
+            self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.GIVE_UP)
+        else:
+            prompt = "Move the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
+            self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
         self._plan, self.landings_world_m, self._above_m = plan, [], None
         for request in self._guided.requests():
             if request.ask is Ask.GO:
                 arrived = super().descend(self.plan)
-                self._above_m = 0.0 if arrived else self.settings.lift_m
+                self._above_m = 0.0 if arrived else self._travel_m()
                 return arrived
-            if request.ask is Ask.MOVE:
+            if self._table().is_sideways:
+                self._console.tell("a grasp from the side is not led by steps. g: go as suggested")
+            elif request.ask is Ask.MOVE:
                 self._move_step(request)
             elif request.ask in (Ask.NEXT, Ask.CAPTURE) and self._is_around():
                 self._motion.supervisor.on_approach()
@@ -79,7 +87,7 @@ class GraspByKeys(GraspCycle):
         """Move the hand by one step; the first one moves it above the suggested grasp."""
         if self._above_m is None:
             self._move_above()
-            self._above_m = self.settings.lift_m
+            self._above_m = self._travel_m()
             return
         jog = self._console.settings
         frame = self.plan.frame.move(jog.jog_m * request.x, jog.jog_m * request.y, jog.jog_rad * request.turn)
@@ -88,6 +96,10 @@ class GraspByKeys(GraspCycle):
         if self._go_with_care(start, self._motion.base_joints(frame, self._table(), above_m)):
             self._plan, self._above_m = replace(self.plan, frame=frame), above_m
             self._console.tell(f"tips {1e3 * above_m:.0f} mm above their grasp height")
+
+    def _travel_m(self) -> float:
+        """How far above the grasp the hand travels."""
+        return travel_height_m(self._table(), self._motion, self.settings, self._hand)
 
     def _go_with_care(self, start: Array, end: Array) -> bool:
         """Move straight to ``end``; back to ``start`` if a fingertip touches something."""

@@ -102,6 +102,11 @@ class OperatorConsole:
         return asked or (self.automatic and self.view.is_steady)
 
     @property
+    def is_attended(self) -> bool:
+        """Whether a person is there, who can do something about a failure."""
+        return self._operator.attended
+
+    @property
     def moves_on(self) -> bool:
         """Whether the operator wants to leave this step."""
         return self.end_wanted or self.undo_wanted
@@ -155,7 +160,7 @@ class OperatorConsole:
         self._waiting.clear()
         self._stage, self._asks = Stage.PLACE, ()
         self.paused = reason
-        return self._operator.attended
+        return self.is_attended
 
     def _show(self, now_ns: int) -> None:
         self._next_panel_ns = now_ns + round(self.settings.panel_s * NANOSECONDS)
@@ -197,7 +202,7 @@ class OperatorConsole:
         self._known_silent = silent
         if fallen:
             self.tell(f"no usable reading from {', '.join(sorted(fallen))}: check cable and power", Level.WARNING)
-            if self._operator.attended:
+            if self.is_attended:
                 self._pause(self._message)
         if back:
             self.tell(f"readings from {', '.join(sorted(back))} are back")

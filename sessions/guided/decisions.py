@@ -23,11 +23,12 @@ class GuidedDecisions(AutonomousDecisions):
     Args:
         estimator: client of the planner, which makes suggestions.
         console: the operator's console.
+        felt: the object is on the table, and was felt, before the first decision.
     """
 
-    def __init__(self, estimator: EstimatorClient, console: OperatorConsole) -> None:
+    def __init__(self, estimator: EstimatorClient, console: OperatorConsole, *, felt: bool = False) -> None:
         super().__init__(estimator)
-        self._console = console
+        self._console, self._felt = console, felt
         self._entered: int | None = None
 
     def prepare(self, index: int) -> None:
@@ -60,7 +61,8 @@ class GuidedDecisions(AutonomousDecisions):
 
     def _enter(self, index: int) -> None:
         self._entered, self._console.grasp = index, index + 1
-        first = "Place the object on the table." if index == 0 else "Ready for the next grasp."
+        ready = f"Ready for the {'next' if index else 'first'} grasp."
+        first = ready if index or self._felt else "Place the object on the table."
         undo = "" if index == 0 else "; u: take the last grasp back"
         self._console.enter(Stage.PLACE, f"{first} SPACE: continue{undo}; e: end", Ask.NEXT, Ask.UNDO, Ask.END)
 

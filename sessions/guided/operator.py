@@ -66,8 +66,9 @@ class Request:
 
 
 class Stage(StrEnum):
-    """Stages of a guided grasp, in order."""
+    """Stages of a guided session: before the first grasp, and of each, in order."""
 
+    FEEL = "feel"
     PLACE = "place"
     GUIDE = "guide"
     CLOSE = "close"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from sessions.guided.operator import Ask, Panel, Request, Stage
 
 _ANSWERS = {
+    Stage.FEEL: Ask.GO,
     Stage.PLACE: Ask.NEXT,
     Stage.GUIDE: Ask.GO,
     Stage.CLOSE: Ask.GO,

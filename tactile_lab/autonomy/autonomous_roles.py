@@ -60,9 +60,15 @@ def autonomous_roles(
     decisions = PolicyDecisions(client, record_choices(runtime), approve, guard)
     if not settings.probing.is_wanted:
         return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.forecast, guard=guard)
-    prober = BoxProber(Toucher(motion, settings.cycle, hand), settings.probing, window, settings.plan.start_m)
+    prober = prober_for(motion, settings, hand)
     felt = prober.feel, prober.find_again
     return SessionRoles(supervisor, cycle, decisions, client, cycle.weigh, cycle.forecast, *felt, guard)
+
+
+def prober_for(motion: Motion, settings: SessionSettings, hand: HandShape) -> BoxProber:
+    """Measures the bounding box of a session's object."""
+    toucher, plan = Toucher(motion, settings.cycle, hand), settings.plan
+    return BoxProber(toucher, settings.probing, plan.yaw_window_rad, plan.start_m)
 
 
 def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, seed: int, dimension: int) -> Planner:
@@ -85,9 +91,15 @@ def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, s
         dimension,
         chooser,
         settings.grasps,
-        SideReach(settings.safety.workspace_radius_m, settings.safety.workspace_centre_m, settings.cycle.standoff_m),
+        side_reach(settings),
         settings.cycle.touch,
     )
+
+
+def side_reach(settings: SessionSettings) -> SideReach:
+    """Where the palm may be beside an object."""
+    safety = settings.safety
+    return SideReach(safety.workspace_radius_m, safety.workspace_centre_m, settings.cycle.standoff_m)
 
 
 def hand_shape(runtime: RigRuntime) -> HandShape:

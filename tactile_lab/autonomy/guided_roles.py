@@ -14,10 +14,11 @@ from sessions.guided.console import OperatorConsole
 from sessions.guided.decisions import GuidedDecisions
 from sessions.guided.motion import GuidedMotion
 from sessions.guided.operator import Operator
+from sessions.guided.survey import SurveyOnRequest
 from sessions.motion.safety import InterruptGuard, SafetySupervisor
 from sessions.recording.attachments import Attachments
 from sessions.rig_runtime.rig_runtime import RigRuntime
-from tactile_lab.autonomy.autonomous_roles import hand_shape
+from tactile_lab.autonomy.autonomous_roles import hand_shape, prober_for, side_reach
 from tactile_lab.autonomy.closing_tables import solve_closings
 from tactile_lab.autonomy.estimator_process import client_for
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner
@@ -61,6 +62,12 @@ def guided_roles(
         else GraspByKeys(motion, cycle, console, hand, settings.plan.yaw_window_rad)
     )
     rule = HeuristicPlanner(settings.plan, np.random.default_rng(seed), dimension)
-    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, hand, dimension)
+    reach = side_reach(settings)
+    planner = Planner(slam, rule, settings.exploration, settings.fixed_grasps, hand, dimension, reach=reach)
     client = client_for(runtime.clock, SlamService(slam, planner), performer.idle)
-    return SessionRoles(supervisor, performer, GuidedDecisions(client, console), client, guard=guard)
+    if guided.led_by == "hand" or not settings.probing.is_wanted:
+        return SessionRoles(supervisor, performer, GuidedDecisions(client, console), client, guard=guard)
+    prober = prober_for(motion, settings, hand)
+    felt = SurveyOnRequest(prober, motion, console).feel, prober.find_again
+    decisions = GuidedDecisions(client, console, felt=True)
+    return SessionRoles(supervisor, performer, decisions, client, survey=felt[0], find=felt[1], guard=guard)

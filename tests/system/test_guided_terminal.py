@@ -80,6 +80,7 @@ def test_person_guides_a_session_with_undo_pause_an_unplugged_sensor_and_a_resum
     before = terminal.modes
     terminal.until("Place the object", "nbox on its side\r")
     terminal.until("note: box on its side")
+    terminal.until("leave that out", " ")
     grasp(terminal)
     terminal.until("Hold still", "p")
     terminal.until("e: end session", "p")

@@ -10,7 +10,7 @@ from rich.text import Text
 from drivers.core.contacts import FINGERS
 from sessions.guided.operator import Panel, Stage
 
-STEPS = (Stage.PLACE, Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE, Stage.ROTATE, Stage.RELEASE)
+STEPS = (Stage.FEEL, Stage.PLACE, Stage.GUIDE, Stage.CLOSE, Stage.HOLD, Stage.CAPTURE, Stage.ROTATE, Stage.RELEASE)
 KEYS = "SPACE next · g go · u undo · x give up · p pause · e end · a automatic · n note · m marker"
 _BAR_N, _BAR_WIDTH = 1.0, 4  # five fingers fit beside one another in 80 columns
 _FORCE_WIDTH = _BAR_WIDTH + len(" 0.00 N")

@@ -113,7 +113,8 @@ def test_a_guided_session(led_by: str, script: tuple[Cue, ...], tmp_path: Path) 
     world = TracedWorld(Disc(np.array([0.005, -0.004])))
     operator = SimulatedOperator(script)
     guided = {"led_by": led_by, "panel_s": 0.05, "attention_s": 60.0}
-    wanted = validate({"grasps": 2, "cycle": BRISK, "fixed_grasps": 2, "guided": guided}, SessionSettings, where="test")
+    plain = {"fixed_grasps": 2, "probing": {"top": False}}
+    wanted = validate({"grasps": 2, "cycle": BRISK, "guided": guided, **plain}, SessionSettings, where="test")
     slam = TactileSlam(SlamSettings(method="odometry"), seed=1)
     roles = guided_roles(world, slam, wanted, operator, tmp_path, seed=3)  # type: ignore[arg-type]
     outcome = Conductor(world, wanted, roles).run()  # type: ignore[arg-type]
@@ -265,7 +266,8 @@ def test_a_failure_ends_a_session_that_nobody_attends(tmp_path: Path) -> None:
 
         world = TracedWorld(Disc(np.array([0.005, -0.004])), fail)
         operator = SimulatedOperator(attended=attended)
-        wanted = validate({"grasps": 1, "cycle": BRISK, "guided": {}}, SessionSettings, where="test")
+        content = {"grasps": 1, "cycle": BRISK, "guided": {}, "probing": {"top": False}}
+        wanted = validate(content, SessionSettings, where="test")
         slam = TactileSlam(SlamSettings(method="odometry"), seed=1)
         roles = guided_roles(world, slam, wanted, operator, tmp_path, seed=3)  # type: ignore[arg-type]
         outcome = Conductor(world, wanted, roles).run()  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ QUICK = {"squeeze_s": 0.1, "finger_rad_s": 20.0, "travel_m_s": 1.0, "turn_rad_s"
 
 
 def settings(grasps: int, **guided: Any) -> SessionSettings:
-    content = {"grasps": grasps, "cycle": QUICK, "fixed_grasps": grasps, "guided": guided}
+    content = {"grasps": grasps, "cycle": QUICK, "fixed_grasps": grasps, "guided": guided, "probing": {"top": False}}
     return validate(content, SessionSettings, where="test")
 
 
