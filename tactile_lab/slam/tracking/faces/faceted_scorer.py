@@ -78,10 +78,12 @@ class FacetedScorer:
         sharp = self.smooth_with_facets(contact_map) or self._sharp(contact_map) or self._sharp_without_one(contact_map)
         if sharp is None or sharp.cost > smooth.cost + _HOPELESS_nats:
             return smooth
+        return _likelier(smooth, self.reconsidered(sharp))
+
+    def reconsidered(self, sharp: Hypothesis) -> Hypothesis:
+        """A faceted hypothesis with other contacts left out where that is more likely, and smoothed again if so."""
         settled = self._mechanisms.improve("doubts", sharp, self._reconsider)
-        if settled.map is not sharp.map:
-            settled = _likelier(settled, self.smooth_with_facets(settled.map))
-        return _likelier(smooth, settled)
+        return settled if settled.map is sharp.map else _likelier(settled, self.smooth_with_facets(settled.map))
 
     def without_errors(self, contact_map: ContactMap) -> ContactMap:
         """The map at its poses, without the contacts that neither a field nor flat faces explain."""
@@ -90,6 +92,10 @@ class FacetedScorer:
         if sharp is None:
             return cleaned
         return _likelier(self._scorer.score(cleaned), self._mechanisms.improve("doubts", sharp, self._reconsider)).map
+
+    def clean(self, contact_map: ContactMap, grasp: int) -> ContactMap:
+        """The map without those contacts of one grasp that the field does not explain."""
+        return self._scorer.clean(contact_map, grasp)[0]
 
     def solid(self, best: Hypothesis) -> SurfaceMesh | None:
         """The surface of a faceted hypothesis in space; None for others."""
@@ -152,7 +158,7 @@ class FacetedScorer:
             return None
         faceted = smoothed_with_faces(contact_map, self._noise)
         found = self._sharp(contact_map.with_rows(faceted.rows)) if faceted else None
-        rounded = smoothed_with_sides(contact_map, self._noise) if contact_map.dimension == 2 else None
+        rounded = smoothed_with_sides(contact_map, self._noise)
         return found if rounded is None else _likelier_of(self._sharp(rounded), found)
 
     def _sharp(self, contact_map: ContactMap) -> Hypothesis | None:

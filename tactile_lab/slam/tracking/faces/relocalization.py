@@ -8,9 +8,10 @@ from many samples of the motion model, and the most promising other places are t
 A wrong turn of a trajectory persists: the following grasps fit each other, and none of them can go back alone. So in
 space the grasps after it are also driven onto the object from its other place, and tried with it.
 
-In space grasps are driven onto the solid that the faces make. In the plane only grasps that the outline explains badly,
-that slid off the end of a face, or that have few contacts are tested again, and they are driven onto the field of all
-others.
+In space grasps are driven onto the solid that the faces make, and contacts that do not fit the field at the other
+place are left out there: a wrong contact costs more than the right place of its grasp gains. In the plane only grasps
+that the outline explains badly, that slid off the end of a face, or that have few contacts are tested again, and they
+are driven onto the field of all others.
 """
 
 from __future__ import annotations
@@ -161,7 +162,11 @@ def _try(contact_map: ContactMap, place: _Place, sharp: FacetedScorer) -> Hypoth
     for index, row in enumerate(place.rows, start=place.index):
         whole = replace(moved.placed[index], pose=row, left_out=frozenset(), moved=Moved.AS_MEANT)
         moved = moved.with_placed(index, whole)
-    return sharp.settle(moved) if contact_map.dimension == 3 else sharp.smooth(moved)
+    if contact_map.dimension == 2:
+        return sharp.smooth(moved)
+    for index in range(place.index, place.index + len(place.rows)):
+        moved = sharp.clean(moved, index)
+    return sharp.settle(moved)
 
 
 def _onto_others(known: ContactMap, grasps: Sequence[int]) -> dict[int, Matched]:

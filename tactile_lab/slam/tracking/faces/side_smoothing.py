@@ -20,9 +20,11 @@ from tactile_lab.slam.shape.selection.planar_choice import rounded_of
 from tactile_lab.slam.shape.surfaces.surface import extract_contour
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 from tactile_lab.slam.tracking.faces.damped_steps import descend
 from tactile_lab.slam.tracking.faces.joint_weights import JointWeights
+from tactile_lab.slam.tracking.faces.walls import walls_from_above
 
 _ORDERING_RESOLUTION_m = 0.002
 _ROUNDS, _STEPS = 4, 15
@@ -36,22 +38,28 @@ def rounded_outline(contact_map: ContactMap) -> RoundedOutline:
 
 
 def smoothed_with_sides(contact_map: ContactMap, noise: MotionNoise) -> ContactMap | None:
-    """Divide a map's contacts into sides, and let poses, sides and the division settle; None if no side is round."""
-    if "round sides" in contact_map.settings.without:
+    """Divide a map's contacts into sides, and let poses, sides and the division settle; None if no side is round.
+
+    Args:
+        contact_map: contacts in the plane, or in space, of which those on upright walls count.
+        noise: of the motion model.
+    """
+    if "round sides" in contact_map.settings.without or contact_map.space is not PLANAR:
         return None
     best: tuple[float, ContactMap] | None = None
-    motion = MotionCost.of(contact_map, noise)
+    seen = contact_map if contact_map.dimension == 2 else walls_from_above(contact_map)
+    motion = MotionCost.of(seen, noise)
     for _ in range(_ROUNDS):
         try:
-            outline = rounded_outline(contact_map)
+            outline = rounded_outline(seen)
         except ShapeError:  # nothing enclosed, or only flat faces
             break
-        value = outline.log_evidence - motion.value(contact_map.rows)
+        value = outline.log_evidence - motion.value(seen.rows)
         if best is not None and value <= best[0] + _SETTLED_nats:
             break
-        best = value, contact_map
-        contact_map = contact_map.with_rows(SideSmoother(contact_map, noise, outline).fit())
-    return None if best is None else best[1]
+        best = value, seen
+        seen = seen.with_rows(SideSmoother(seen, noise, outline).fit())
+    return None if best is None else contact_map.with_rows(best[1].rows)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 A smooth field with a long kernel states covariances that are too small. Flat faces whose places are estimated with the
 poses do not, so they are used wherever contacts form any (decision 53); in space those of round objects turn with the
-field's surface (decision 102).
+field's surface (decision 102). Straight and round sides have their own (decisions 101 and 117).
 
 The object frame is born at the first grasp, whose pose is therefore given. An error of that grasp is an error of all
 other poses in the same direction; in the frame in which all grasps agree best it counts as one of many.
@@ -13,15 +13,18 @@ moves the pose and leaves no trace in the contacts: it has to be stated (decisio
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
+from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
@@ -29,6 +32,7 @@ from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
 from tactile_lab.slam.tracking.faces.bends import Bends
 from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
 from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
+from tactile_lab.slam.tracking.faces.walls import walls_from_above
 
 _STEP = 1e-6
 
@@ -52,7 +56,7 @@ class PoseCovariances:
         joint = _palm(contact_map, noise)
         if count > 1:
             joint[size:, size:] += _of_poses(contact_map, noise)
-        born, centred = (np.eye(count * size) - frame for frame in _frames(contact_map))
+        born, centred = relative_to_frames(contact_map)
         return cls(_blocks(born @ joint @ born.T, size), _blocks(centred @ joint @ centred.T, size))
 
 
@@ -60,6 +64,15 @@ def with_covariances(contact_map: ContactMap, covariances: Array) -> ContactMap:
     """The map with the covariance of each pose but the first."""
     later = [replace(one, covariance=each) for one, each in zip(contact_map.placed[1:], covariances[1:], strict=True)]
     return replace(contact_map, placed=(contact_map.placed[0], *later))
+
+
+def relative_to_frames(contact_map: ContactMap) -> tuple[Array, Array]:
+    """Changes of all pose vectors in the object frame of the first grasp, and in that in which all agree best, by
+    changes of all pose vectors in the world, both of shape (n size, n size).
+    """
+    unchanged = np.eye(len(contact_map.placed) * contact_map.space.size)
+    first, mean = _frames(contact_map)
+    return unchanged - first, unchanged - mean
 
 
 def _of_poses(contact_map: ContactMap, noise: MotionNoise) -> Array:
@@ -74,22 +87,37 @@ def _of_poses(contact_map: ContactMap, noise: MotionNoise) -> Array:
 
 def _certainty(contact_map: ContactMap, noise: MotionNoise) -> FacetCertainty | SideCertainty:
     """Of flat faces, or of straight and round sides where these are likelier. Raises ShapeError, LinAlgError."""
-    shape = best_shape(contact_map.fit(), contact_map.free_points_m) if contact_map.dimension == 2 else None
-    if isinstance(shape, RoundedOutline):
+    if contact_map.dimension == 3:
+        return _certainty_in_space(contact_map, noise)
+    if isinstance(best_shape(contact_map.fit(), contact_map.free_points_m), RoundedOutline):
         return SideCertainty.of(contact_map, noise)
-    return FacetCertainty.of(contact_map, noise, Bends.of(contact_map) if _is_round(contact_map) else None)
+    return FacetCertainty.of(contact_map, noise)
 
 
-def _is_round(contact_map: ContactMap) -> bool:
-    """Whether a smooth field in space is likelier than a solid with flat faces."""
-    if contact_map.dimension == 2:
-        return False
-    field, upright = contact_map.fit(), contact_map.space is PLANAR
+def _certainty_in_space(contact_map: ContactMap, noise: MotionNoise) -> FacetCertainty | SideCertainty:
+    """The same of upright round walls, or of flat faces that turn with the field where that is likelier than they."""
+    field, on_table = contact_map.fit(), contact_map.space is PLANAR
+    smooth = field.log_marginal_likelihood()
+    flat = _evidence(lambda: Polyhedron.fit(field, contact_map.free_points_m, upright=on_table))
+    if on_table and _evidence(lambda: _with_round_walls(field)) > max(flat, smooth):
+        return SideCertainty.of(walls_from_above(contact_map), noise)
+    return FacetCertainty.of(contact_map, noise, Bends.of(contact_map) if smooth > flat else None)
+
+
+def _with_round_walls(field: Gpis) -> Prism:
+    """The likeliest prism. Raises ShapeError if its walls are not straight and round, or there is none."""
+    prism = Prism.fit(field, best_shape)
+    if not isinstance(prism.outline, RoundedOutline):
+        raise ShapeError("walls are not straight and round")
+    return prism
+
+
+def _evidence(make: Callable[[], Polyhedron | Prism]) -> float:
+    """The log evidence of a solid; minus infinity if there is none."""
     try:
-        solid = Polyhedron.fit(field, contact_map.free_points_m, upright=upright)
-    except ShapeError:  # too many planes
-        return True
-    return solid.log_evidence < field.log_marginal_likelihood()
+        return make().log_evidence
+    except ShapeError:  # too few contacts on walls, or on too many planes
+        return -np.inf
 
 
 def _palm(contact_map: ContactMap, noise: MotionNoise) -> Array:

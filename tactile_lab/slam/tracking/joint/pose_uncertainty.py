@@ -32,13 +32,14 @@ from tactile_lab.slam.shape.selection.planar_choice import GpisShape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, on_walls
 from tactile_lab.slam.shape.surfaces.surface import Contour, RESOLUTION_m, SurfaceMesh
-from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR
 from tactile_lab.slam.tracking.evidence.pose_evidence import PoseEvidence
 from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
 from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
+from tactile_lab.slam.tracking.faces.walls import walls_from_above
 
 _Extracted = TypeVar("_Extracted", Contour, SurfaceMesh)
 
@@ -59,7 +60,7 @@ def propagate_pose_uncertainty(
         return extracted
     places_m = extracted.points_m if isinstance(extracted, Contour) else extracted.vertices
     normals = extracted.normals
-    used = _walls(contact_map) if isinstance(shape, Prism) else contact_map
+    used = walls_from_above(contact_map) if isinstance(shape, Prism) else contact_map
     axes = slice(0, used.dimension)
     changes = _changes(used, noise, places_m[:, axes], normals[:, axes], shape)
     fit = _BestFit.of(places_m, normals, extracted.sigma_m, on_table=contact_map.space is PLANAR)
@@ -192,18 +193,3 @@ def _is_sharp(shape: FittedShape) -> bool:
 def _outline(shape: FittedShape) -> FittedShape:
     """A prism's outline; of other shapes themselves."""
     return shape.outline if isinstance(shape, Prism) else shape
-
-
-def _walls(contact_map: ContactMap) -> ContactMap:
-    """The contacts on upright walls seen from above, at the same poses, with the best kernel for them."""
-    placed = tuple(_project_down(grasp) for grasp in contact_map.placed)
-    return replace(contact_map, placed=placed).with_best_kernel()
-
-
-def _project_down(grasp: PlacedGrasp) -> PlacedGrasp:
-    kept = grasp.kept_world
-    walls = kept.select(on_walls(kept.normals))
-    level = walls.normals[:, :2] / np.linalg.norm(walls.normals[:, :2], axis=1, keepdims=True)
-    given = walls.points_m[:, :2], level, walls.point_sigma_m, walls.normal_sigma_rad, np.empty((0, 2))
-    flat = ContactSet(*given, shared=walls.shared)
-    return replace(grasp, contacts_world=flat, left_out=frozenset())

@@ -21,6 +21,9 @@ from tactile_lab.slam.tracking.joint.trajectory_splicing import splice_trajector
 _MOST_SPLICINGS = 3
 """A trajectory with several wrong turns is repaired at one after the other."""
 
+_MOST_REVISIONS = 3
+"""So often contacts are doubted again after grasps were moved, and grasps moved again after that."""
+
 
 class SecondOpinions:
     """Changes hypotheses where that makes them more likely.
@@ -101,10 +104,25 @@ class SecondOpinions:
         """The hypothesis with grasps relocalized on its object."""
         relocalizer = Relocalizer(sharp, self._noise, self._settings.proposals)
         placed = self._retry_unplaced(hypothesis, sharp)
-        found = self._mechanisms.improve("placing on the object", placed, relocalizer.improve)
+        found = self._place_on_object(placed, relocalizer)
+        for _ in range(_MOST_REVISIONS):
+            if found.map is placed.map or (revised := self._revise_contacts(found, sharp)).map is found.map:
+                break
+            placed, found = revised, self._place_on_object(revised, relocalizer)
         self.rivals = relocalizer.rivals
         onto_missing = partial(with_missing_face, sharp=sharp, noise=self._noise)
         return self._mechanisms.improve("placing on the object", found, onto_missing)
+
+    def _place_on_object(self, hypothesis: Hypothesis, relocalizer: Relocalizer) -> Hypothesis:
+        return self._mechanisms.improve("placing on the object", hypothesis, relocalizer.improve)
+
+    def _revise_contacts(self, hypothesis: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
+        """A faceted hypothesis in space that leaves out contacts, with others left out where that is more likely.
+
+        In the plane that was done with each place of a grasp.
+        """
+        wrong = hypothesis.map.dimension == 3 and hypothesis.map.left_out_count > 0
+        return sharp.reconsidered(hypothesis) if wrong and sharp.is_sharp(hypothesis) else hypothesis
 
     def _retry_unplaced(self, best: Hypothesis, sharp: FacetedScorer) -> Hypothesis:
         """The hypothesis with grasps placed that did not fit the shape with a wrong contact, if more likely."""

@@ -116,6 +116,18 @@ def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: Cont
     assert abs(gap[2]) < 0.15
 
 
+def test_a_grasp_with_wrong_contacts_is_found_its_place_without_them(l_block: ContactMap) -> None:
+    """Two of five contacts fit nothing where the grasp belongs; where it is, one of them lies on a face by chance."""
+    grasp = l_block.placed[9]
+    points_m = grasp.contacts_world.points_m.copy()
+    points_m[:2] += [[0.03, 0.02, 0.01], [-0.025, 0.03, -0.01]]
+    spoilt = l_block.with_placed(9, replace(grasp, contacts_world=replace(grasp.contacts_world, points_m=points_m)))
+    elsewhere = moved(spoilt, 9, [0.012, -0.02, np.deg2rad(90.0)]).without_contact(9, 0)
+    found = Relocalizer(judge_of(l_block), NOISE, ProposalSettings()).improve(rated(elsewhere))
+    assert {0, 1} <= found.map.placed[9].left_out
+    assert np.linalg.norm(found.map.rows[9, :2] - l_block.rows[9, :2]) < 0.006
+
+
 @pytest.mark.long  # quicker: a single grasp on wrong faces, above
 def test_grasps_that_took_a_wrong_turn_together_are_turned_back_together() -> None:
     """A third of a turn of a prism with three equal sides: only the motion tells, and only at both ends of the run."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_lab.experiments.data import planar_data, second_family
+from tactile_lab.experiments.data import planar_data, second_family, spatial_data
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
@@ -13,8 +13,10 @@ from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
+from tactile_lab.slam.tracking.faces.facet_certainty import FacetCertainty
 from tactile_lab.slam.tracking.faces.side_certainty import SideCertainty
 from tactile_lab.slam.tracking.faces.side_smoothing import SideSmoother, rounded_outline, smoothed_with_sides
+from tactile_lab.slam.tracking.joint.pose_covariance import PoseCovariances
 from tactile_lab.slam.tracking.joint.pose_uncertainty import propagate_pose_uncertainty
 from tests.support.shape_examples import half_disc
 from tests.support.simulated_contacts import placed_truly, true_map
@@ -79,6 +81,26 @@ def test_a_grasp_that_touches_the_round_side_alone_may_be_turned_about_its_centr
     assert alone.any()
     assert (~alone).any()
     assert turns_rad[alone].min() > 2 * np.median(turns_rad[~alone])
+
+
+def test_round_walls_are_smoothed_as_such_in_space_too() -> None:
+    true = placed_truly(second_family.simulate("half-cylinder", 4, dimension=3, count=12), 3)
+    start = shaken(true)
+    found = smoothed_with_sides(start, NOISE)
+    assert found is not None
+    assert found.dimension == 3
+    off_m = [np.linalg.norm(each.rows[1:, :2] - true.rows[1:, :2], axis=1) for each in (found, start)]
+    assert np.median(off_m[0]) < 0.7 * np.median(off_m[1])
+    assert smoothed_with_sides(placed_truly(spatial_data.simulate("box-12x6x6", 0, count=8), 3), NOISE) is None
+
+
+def test_a_grasp_on_a_round_wall_alone_may_be_turned_about_its_axis() -> None:
+    """Flat faces would hold it: they stand in for the wall, and each has one normal."""
+    true = placed_truly(second_family.simulate("half-cylinder", 4, dimension=3, count=12), 3)
+    turns_rad = np.sqrt(PoseCovariances.of(true, NOISE).birth[1:, 2, 2])
+    flat = FacetCertainty.of(true, NOISE)
+    of_flat_rad = np.sqrt(np.diag(np.linalg.inv(flat.information_of_poses))[2::3])
+    assert turns_rad.max() > 1.3 * of_flat_rad.max()
 
 
 def test_a_prism_over_a_half_disc_states_what_poses_and_sides_leave_open() -> None:
