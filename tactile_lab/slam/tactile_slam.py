@@ -40,6 +40,7 @@ from tactile_lab.slam.current_shape import CurrentShape
 from tactile_lab.slam.doubt.assessment import Assessment, assess
 from tactile_lab.slam.doubt.heights import side_heights_m
 from tactile_lab.slam.doubt.rivals import displaced
+from tactile_lab.slam.doubt.spread import spread_by
 from tactile_lab.slam.doubt.status import Alternative
 from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.slam.graph.relocation import relocated_poses
@@ -186,12 +187,13 @@ class TactileSlam:
         wanted = self._settings
         shape = self.shape(wanted.contour_resolution_m if wanted.dimension == 2 else wanted.mesh_resolution_m)
         told = self._assess(shape)
+        covariances, common = self._covariances_with(told.alternatives)
         return SlamResult(
             method=self._settings.method,
             seed=self._seed,
             dimension=self._settings.dimension,
             world_T_object=self._trajectory(),
-            covariances=self._covariances(),
+            covariances=covariances,
             steps=tuple(self._steps),
             loops=self._back_end.reports,
             surface=self.surface,
@@ -202,7 +204,7 @@ class TactileSlam:
             known_share=told.known_share,
             doubts=told.doubts,
             alternatives=told.alternatives,
-            common_covariances=self._common_covariances(),
+            common_covariances=common,
         )
 
     @property
@@ -374,6 +376,14 @@ class TactileSlam:
             self._space.pose(grasp.pose, self._origin_height_m) if grasp else None for grasp in self._placed_grasps()
         )
 
+    def _covariances_with(self, others: Sequence[Alternative]) -> tuple[tuple[Array | None, ...], ...]:
+        """Covariances of the poses, and in the best common object frame, with what alternatives add."""
+        stated = self._covariances(), self._common_covariances()
+        if not others or self._tracker is None:
+            return stated
+        spread = spread_by(others, self._tracker.refined)
+        return tuple(_sums(given, added) for given, added in zip(stated, (spread.birth, spread.common), strict=True))
+
     def _common_covariances(self) -> tuple[Array | None, ...]:
         if not isinstance(self._tracker, JointTracker):
             return ()
@@ -382,3 +392,12 @@ class TactileSlam:
 
     def _covariances(self) -> tuple[Array | None, ...]:
         return tuple(grasp.covariance if grasp else None for grasp in self._placed_grasps())
+
+
+def _sums(stated: Sequence[Array | None], added: Array) -> tuple[Array | None, ...]:
+    """Covariances of all grasps with what is added to those of the last ones, shape (k, size, size)."""
+    before = len(stated) - len(added)
+    return tuple(
+        each if each is None or index < before else np.asarray(each + added[index - before])
+        for index, each in enumerate(stated)
+    )

@@ -22,6 +22,11 @@ _TOGETHER_m = 0.025
 """Contacts this close to each other are of one part, which is about two fingertips wide."""
 
 _LEAST_GRASPS = 2
+_STRAYS = 3
+"""Where so many other contacts lie off the surface, two wrong ones are near each other by chance: one grasp more must
+agree, unless the estimate uses a contact there.
+"""
+
 ALONE_m = 0.020
 """Outside of the surface: no error of a contact that fits its grasp is so large."""
 
@@ -35,11 +40,13 @@ def missing_parts(contact_map: ContactMap, shape: SurfaceMesh, floor_m: float | 
         floor_m: height of the table under a standing object, object frame; None for an object held free.
     """
     points_m, grasps, kept = _all_contacts(contact_map)
-    found = []
-    for group in unexplained(points_m, shape, far_m=FAR_m, together_m=_TOGETHER_m):
+    groups, found = unexplained(points_m, shape, far_m=FAR_m, together_m=_TOGETHER_m), []
+    for group in groups:
         concerned = tuple(sorted({int(each) for each in grasps[group.members]}))
-        alone = kept[group.members].any() and group.farthest_m > ALONE_m and not group.is_inside
-        if len(concerned) >= _LEAST_GRASPS or alone:
+        is_used = kept[group.members].any()
+        alone = is_used and group.farthest_m > ALONE_m and not group.is_inside
+        by_chance = not is_used and sum(len(other.members) for other in groups if other is not group) >= _STRAYS
+        if len(concerned) >= _LEAST_GRASPS + by_chance or alone:
             words = _words(points_m[group.members], group, floor_m)
             found.append(Doubt("missing-part", words, concerned, grave=False))
     return found

@@ -21,7 +21,9 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.evidence.motion_cost import MotionCost
 
 _UNDONE = 0.02
-"""Probability of each of two slips that undo each other, or less: chance makes one such pair in a hundred sessions."""
+"""Probability of each of two slips that undo each other, or less: chance makes one such pair in a hundred sessions, and
+more where slips have heavy tails. So it is not grave if neither slip is improbable and the grasp's contacts confirm it.
+"""
 
 _UNDONE_COSINE = -0.7
 """Cosine of the angle between two slips that undo each other, or less; for a rotation it is -1 or 1."""
@@ -86,9 +88,16 @@ def _slips(contact_map: ContactMap, noise: MotionNoise) -> tuple[Array, NDArray[
     return cost.scaled_slips(contact_map.rows), bound
 
 
+def _confirmed(contact_map: ContactMap) -> NDArray[np.bool_]:
+    """Whether the contacts of each grasp confirm where it is, shape (k,)."""
+    return np.array([len(grasp.kept) >= _CONFIRMING for grasp in contact_map.placed])
+
+
 def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     slips, bound = _slips(contact_map, noise)
     split, found = contact_map.space.translations, []
+    unlikely = chi_squared_tail(np.sum(slips**2, axis=1), contact_map.space.size) < _UNLIKELY
+    doubtful = unlikely[1:] | unlikely[:-1] | ~_confirmed(contact_map)[1:-1]
     for part, kind in ((slice(None, split), "moved"), (slice(split, None), "turned")):
         vectors = slips[:, part]
         lengths = np.linalg.norm(vectors, axis=1)
@@ -98,14 +107,14 @@ def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
         for step in np.flatnonzero(opposite & bound[1:] & bound[:-1]):
             grasp = int(step) + 1
             words = f"grasp {grasp + 1} is {kind} by a slip that the next one undoes: it is probably placed wrongly"
-            found.append(Doubt("undone-slips", words, (grasp,)))
+            found.append(Doubt("undone-slips", words, (grasp,), grave=bool(doubtful[step])))
     return found
 
 
 def _unlikely(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     slips, bound = _slips(contact_map, noise)
     probabilities = chi_squared_tail(np.sum(slips**2, axis=1), contact_map.space.size)
-    confirmed = np.array([len(grasp.kept) >= _CONFIRMING for grasp in contact_map.placed])
+    confirmed = _confirmed(contact_map)
     doubtful = (probabilities < _INCREDIBLE) | ~(confirmed[1:] & confirmed[:-1])
     return [
         Doubt(

@@ -56,6 +56,16 @@ def test_contacts_of_one_grasp_alone_or_apart_from_each_other_may_be_wrong() -> 
     assert [missing_parts(each, box()) for each in (alone, apart, explained)] == [[], [], []]
 
 
+def test_where_others_are_wrong_two_are_near_each_other_by_chance_and_three_agree() -> None:
+    wrong, strays = frozenset({3}), ([-0.06, 0.0, 0.0], [0.0, -0.065, 0.0], [0.0, 0.07, 0.01])
+    others = tuple(grasp(*ON_BOX_m, each, left_out=wrong) for each in strays)
+    on_handle = [grasp(*ON_BOX_m, each, left_out=wrong) for each in (*ON_HANDLE_m, [0.062, 0.001, 0.014])]
+    assert missing_parts(a_map(*on_handle[:2], *others), box()) == []
+    assert len(missing_parts(a_map(*on_handle[:2], *others[:2]), box())) == 1
+    assert len(missing_parts(a_map(*on_handle, *others), box())) == 1
+    assert len(missing_parts(a_map(grasp(*ON_BOX_m, ON_HANDLE_m[0]), on_handle[1], *others), box())) == 1
+
+
 def test_one_contact_far_outside_that_the_estimate_uses_is_told() -> None:
     (told,) = missing_parts(a_map(grasp(*ON_BOX_m, ON_HANDLE_m[0]), grasp(*ON_BOX_m)), box(), floor_m=-0.03)
     assert "a contact at x 65, y 2 mm of the model and 40 mm above the table lies 35 mm outside" in told.words

@@ -7,6 +7,7 @@ import pytest
 
 from tactile_lab.experiments.data.outlines import OUTLINES_m
 from tactile_lab.slam.doubt.rivals import alternatives, doubts_of, turned_by_symmetry
+from tactile_lab.slam.doubt.spread import spread_by
 from tactile_lab.slam.doubt.symmetry import ROUND, Symmetry, symmetry_of
 from tactile_lab.slam.shape.surfaces.surface import Contour
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
@@ -72,6 +73,27 @@ def test_rivals_are_told_with_their_grasps_and_probabilities() -> None:
     assert doubt.grave
     assert "grasps 1 to 4 turned by 46°" in doubt.words
     assert doubts_of(found[:0]) == ()
+
+
+def test_what_an_alternative_adds_to_the_covariances_is_its_square_times_its_probability() -> None:
+    best = true_map("rectangle", seed=5)
+    found = alternatives(best, [(moved(best, slice(7, 8), np.array([0.03, 0.0, 0.0])), 2.0)], None, 0.0)
+    chance = found[0].probability
+    spread = spread_by(found, best)
+    expected = np.zeros(len(best.rows))
+    expected[7] = chance * 0.03**2
+    np.testing.assert_allclose(np.trace(spread.birth[:, :2, :2], axis1=1, axis2=2), expected, atol=1e-9)
+    shares = np.where(np.arange(12) == 7, 11 / 12, 1 / 12)  # the best common frame goes a twelfth of the way with it
+    added = np.trace(spread.common[:, :2, :2], axis1=1, axis2=2)
+    np.testing.assert_allclose(added, chance * (0.03 * shares) ** 2, rtol=0.05)
+
+
+def test_where_the_first_grasp_may_be_elsewhere_all_others_are_uncertain_in_its_frame() -> None:
+    best = true_map("rectangle", seed=5)
+    found = alternatives(best, [(moved(best, slice(0, 1), np.array([0.03, 0.0, 0.0])), 0.0)], None, 0.0)
+    added = np.trace(spread_by(found, best).birth[:, :2, :2], axis1=1, axis2=2)
+    assert added[0] == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(added[1:], 0.5 * 0.03**2, rtol=1e-3)
 
 
 def test_turns_of_a_hexagon_are_no_alternatives() -> None:
