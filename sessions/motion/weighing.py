@@ -3,7 +3,8 @@
 The table's friction pulls the other way when the hand turns round: half the difference is the friction, without what
 the fingers do to each other. The lifted object is moved to and fro as well. What hangs free does not mind; what still
 stands on the table with an edge is held back, and its weight is not all in the fingers: then the hand holds it as
-firmly as it may, and lifts it higher.
+firmly as it may, and lifts it higher. While it hangs it is squeezed more and less: its weight stays, and what changes
+in the sum of the forces tells by how much the joint angles are wrong.
 """
 
 from __future__ import annotations
@@ -27,6 +28,10 @@ from sessions.perception.weighing.weighing import Hanging
 _BACK_m, _JERK = 0.003, 2
 _FIRMER = 1.25
 """Held by a force only so much larger, the object would slip out instead of being lifted."""
+_STANDS_SHARE = 0.5
+"""Of the upward force: less, and the object that is set down stands on the table."""
+_PRESSED_SHARE = 0.95
+"""Of the force that counts as pressed hard: what a fingertip may press with for a moment."""
 
 
 class WeighingSettings(StrictModel):
@@ -39,9 +44,12 @@ class WeighingSettings(StrictModel):
             share of ``cycle.pressed_N``, for the next lift.
         lifts_m, lift_m_s: how far, one after the other until it hangs free, and how fast.
         lower_m_s: how fast it is set down; what leans lands on an edge, and is turned between the fingers.
+        landed_N: force of each finger once it stands, until the hand is down.
         most_N: upward force at which the hand lifts no further, and sets the object down again.
         drag_m: how far to each side the object is dragged.
         shift_m, shift_m_s: how far to each side it is moved while it hangs; how fast it is moved and dragged.
+        most_share, least_share: the hanging object is squeezed with so much of ``squeeze_N``, and with so much of that.
+        swings, swing_s: how often, and how long each time.
         rest_s: for the object to stop swinging.
         patience: cycles in a row with too much force, or without a hold, after which the object is set down again.
     """
@@ -54,10 +62,15 @@ class WeighingSettings(StrictModel):
     lifts_m: tuple[Annotated[float, Field(gt=0.0, le=0.05)], ...] = Field(default=(0.015, 0.025), min_length=1)
     lift_m_s: float = Field(default=0.04, gt=0.0, le=0.05)
     lower_m_s: float = Field(default=0.010, gt=0.0, le=0.05)
+    landed_N: float = Field(default=0.3, gt=0.0)
     most_N: float = Field(default=8.0, gt=0.0)
     drag_m: float = Field(default=0.006, gt=0.0, le=0.02)
     shift_m: float = Field(default=0.003, gt=0.0, le=0.01)
     shift_m_s: float = Field(default=0.03, gt=0.0, le=0.05)
+    most_share: float = Field(default=1.25, ge=1.0)
+    least_share: float = Field(default=0.8, gt=0.0, le=1.0)
+    swings: int = Field(default=3, ge=0)
+    swing_s: float = Field(default=0.8, gt=0.0)
     rest_s: float = Field(default=0.1, ge=0.0)
     patience: int = Field(default=5, ge=1)
 
@@ -121,8 +134,10 @@ class Weigher:
 
         self._rest(s.squeeze_s)
         runtime.begin_hold()
-        end, _ = self._move_to_and_fro(raised, (0.0, s.drag_m), runtime.begin_dragging, runtime.end_dragging)
+        runtime.begin_dragging()
+        end = self._move_to_and_fro(raised, 0.0, s.drag_m)
         if end is LiftEnd.HUNG:
+            runtime.end_dragging()
             end = self._lift(raised)
         return end
 
@@ -143,53 +158,72 @@ class Weigher:
         return end
 
     def _hang(self, raised: Callable[..., Array], height_m: float) -> LiftEnd:
-        """To and fro; :attr:`LiftEnd.HELD` if something but the fingertips holds the object."""
+        """To and fro, and what hangs free is squeezed more and less; :attr:`LiftEnd.HELD` if something but the
+        fingertips holds the object.
+        """
         runtime = self._motion.runtime
         self._rest(self._settings.rest_s)
-        where_m = height_m, self._settings.shift_m
-        end, found = self._move_to_and_fro(raised, where_m, runtime.begin_hanging, runtime.end_hanging)
-        return LiftEnd.HELD if isinstance(found, Hanging) and not found.is_free else end
+        runtime.begin_hanging()
+        if (end := self._move_to_and_fro(raised, height_m, self._settings.shift_m)) is not LiftEnd.HUNG:
+            return end
+        found = runtime.end_hanging()
+        if isinstance(found, Hanging) and not found.is_free:
+            return LiftEnd.HELD
+        runtime.begin_hanging()
+        end = self._swing_squeeze(raised(height_m))
+        runtime.end_hanging()
+        return end
+
+    def _swing_squeeze(self, joints: Array) -> LiftEnd:
+        """Squeeze more and less, the positioner's joints at rest."""
+        s, usual_N = self._settings, self._squeeze_N
+        most_N = min(s.most_share * usual_N, self._grip.share_pressed(_PRESSED_SHARE))
+        least_N = s.least_share * most_N
+
+        def squeezed(share: float) -> Array:
+            self._squeeze_N = float(np.interp(np.sin(2 * np.pi * s.swings * share), [-1.0, 1.0], [least_N, most_N]))
+            return joints
+
+        _, end = self._follow(squeezed, s.swings * s.swing_s)
+        self._squeeze_N = usual_N
+        return end
 
     def _set_down(self, raised: Callable[..., Array], height_m: float) -> bool:
         """Down again; a little back if a fingertip is pressed: one that has slid up comes down on the object.
+
+        The object has crept down in the fingers, and stands before the hand is down: then they slide along it.
 
         Returns:
             Whether the hand is down.
         """
         s, self._squeeze_N = self._settings, self._settings.squeeze_N
-        duration_s = height_m / s.lower_m_s
-        share, end = self._follow(lambda share: raised((1 - share) * height_m), duration_s, LiftEnd.PRESSED, _JERK)
+        held_N = self._motion.runtime.perception.held_N
+        stands_N = _STANDS_SHARE * held_N()
+
+        def lowered(share: float) -> Array:
+            if held_N() < stands_N:
+                self._squeeze_N = s.landed_N
+            return raised((1 - share) * height_m)
+
+        share, end = self._follow(lowered, height_m / s.lower_m_s, LiftEnd.PRESSED, _JERK)
+        self._squeeze_N = s.squeeze_N
         if end is LiftEnd.PRESSED:
             at_m = (1 - share) * height_m
             self._motion.follow(lambda share: raised(at_m + share * _BACK_m), _BACK_m / s.lift_m_s, self._keep)
         self._rest(s.rest_s)
         return end is LiftEnd.HUNG
 
-    def _move_to_and_fro(
-        self,
-        raised: Callable[..., Array],
-        where_m: tuple[float, float],
-        begin: Callable[[], object],
-        complete: Callable[[], object],
-    ) -> tuple[LiftEnd, object]:
-        """To one side, to the other and back; what the fingertips feel meanwhile is measured.
-
-        The hand moves across the direction in which the thumb holds against the fingers: along it, their forces would
-        change.
+    def _move_to_and_fro(self, raised: Callable[..., Array], height_m: float, far_m: float) -> LiftEnd:
+        """To one side, to the other and back, across the direction in which the thumb holds against the fingers: along
+        it, their forces would change.
 
         Args:
             raised: positioner joints at a height and a distance aside.
-            where_m: the height, and how far to each side.
-            begin, complete: start and end the measurement in the runtime.
-
-        Returns:
-            How it ended, and what ``complete`` returned.
+            height_m: the height.
+            far_m: how far to each side.
         """
-        height_m, far_m = where_m
-        begin()
         duration_s = 4 * far_m / self._settings.shift_m_s
-        _, end = self._follow(lambda share: raised(height_m, _to_and_fro(share) * far_m), duration_s)
-        return end, complete() if end is LiftEnd.HUNG else None
+        return self._follow(lambda share: raised(height_m, _to_and_fro(share) * far_m), duration_s)[1]
 
     def _follow(
         self,

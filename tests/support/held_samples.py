@@ -13,7 +13,9 @@ CENTRE_m, HEIGHT_m = np.array([0.4, -0.02]), 0.05
 """Where the weight hangs at first."""
 
 
-def held_samples(pull_N: float, upward_N: float, *, tilted: float = 0.0, uneven: float = 0.0) -> CarrySamples:
+def held_samples(
+    pull_N: float, upward_N: float, *, tilted: float = 0.0, uneven: float = 0.0, swing: float = 0.0
+) -> CarrySamples:
     """Samples of a right hand whose fingers carry a weight and drag it against a pull.
 
     Args:
@@ -21,6 +23,7 @@ def held_samples(pull_N: float, upward_N: float, *, tilted: float = 0.0, uneven:
         upward_N: of all fingers together.
         tilted: how far the hand moves along y for each metre along x.
         uneven: share of the pull that goes up and down on the way.
+        swing: share of the squeeze that goes up and down.
     """
     count = 41
     aside_m = 0.005 * np.interp(np.arange(count), [0, 10, 30, 40], [0.0, 1.0, -1.0, 0.0])
@@ -33,6 +36,7 @@ def held_samples(pull_N: float, upward_N: float, *, tilted: float = 0.0, uneven:
         place = np.array([CENTRE_m[0] + aside_m[n], CENTRE_m[1], HEIGHT_m])
         for at, finger in enumerate(FINGERS):
             squeeze = np.array([0.0, 2.0, 0.0]) if finger == "TH" else np.array([0.0, -0.5, 0.0])
+            squeeze = squeeze * (1 + swing * np.sin(2 * np.pi * n / 20))
             on_tip = -(squeeze + np.array([speed[n] * pull_N, 0.0, upward_N]) / 5)
             rotation, origin = frames[n, at, :3, :3], frames[n, at, :3, 3]
             readings[n, at] = [*(rotation.T @ on_tip), *(rotation.T @ np.cross(place - origin, on_tip))]

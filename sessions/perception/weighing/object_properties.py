@@ -60,6 +60,11 @@ class ObjectProperties:
         self.draggings = [each for each in self.draggings if each[0] < grasp_index]
         self.sliding = [each for each in self.sliding if each[0] < grasp_index]
 
+    def hung_in(self, grasp_index: int) -> Hanging | None:
+        """The last lifting, if it was in this grasp and the object hung free."""
+        index, found = self.hangings[-1] if self.hangings else (-1, None)
+        return found if index == grasp_index and found is not None and found.is_free else None
+
     @property
     def is_known(self) -> bool:
         """Whether the object was weighed or dragged, with whatever result."""

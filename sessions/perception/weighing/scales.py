@@ -9,9 +9,10 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.core.errors import SessionError
 from drivers.shadow.protocol.palm_images import Side
+from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.weighing.object_properties import ObjectProperties
-from sessions.perception.weighing.weighing import Dragging, Hanging, dragging, hanging
+from sessions.perception.weighing.weighing import Dragging, Hanging, dragging, hanging, until_it_slips
 from sessions.recording.session_events import EventKind, SessionEvent
 
 
@@ -70,14 +71,30 @@ class Scales:
         samples, carried = self._held.samples_since(begun_ns), self._held.carried_until(begun_ns)
         if samples is None:
             return None
-        found = hanging(samples, self._held.fingertips, self._side, self._joint_sigma_rad, self._held.contact_height_m)
-        if carried is not None:
-            back = np.asarray(carried.motion.transformTo(found.centre_m))
-            sigma_m = np.hypot(found.centre_sigma_m, carried.sigma.translation_m)
-            found = replace(found, centre_m=back, centre_sigma_m=sigma_m)
-        self.properties.hangings.append((grasp_index, found))
+        if (before := self.properties.hung_in(grasp_index)) is not None:
+            found = self._weigh_again(samples, before)
+        else:
+            found = self._hanging(samples)
+            if carried is not None:
+                back = np.asarray(carried.motion.transformTo(found.centre_m))
+                sigma_m = np.hypot(found.centre_sigma_m, carried.sigma.translation_m)
+                found = replace(found, centre_m=back, centre_sigma_m=sigma_m)
+            self.properties.hangings.append((grasp_index, found))
         self._tell_odometry()
         return found
+
+    def _weigh_again(self, samples: CarrySamples, before: Hanging) -> Hanging:
+        """Of one lift the more certain weight counts; the centre is where it was at first, before the object crept."""
+        steady = until_it_slips(samples, self._held.fingertips, self._side)
+        found = before if steady is None else self._hanging(steady)
+        if not (found.is_free and found.weight_sigma_N < before.weight_sigma_N):
+            return before
+        found = replace(found, centre_m=before.centre_m, centre_sigma_m=before.centre_sigma_m)
+        self.properties.hangings[-1] = self.properties.hangings[-1][0], found
+        return found
+
+    def _hanging(self, samples: CarrySamples) -> Hanging:
+        return hanging(samples, self._held.fingertips, self._side, self._joint_sigma_rad, self._held.contact_height_m)
 
     def _begun_ns(self) -> int:
         if self._from_ns is None:

@@ -10,13 +10,13 @@ from scipy.ndimage import gaussian_filter1d
 
 from drivers.core.contacts import Array
 from drivers.core.fingertip import ContinuousFingertip
-from drivers.shadow.model.kinematics import JOINTS
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.net_wrench import NetWrench, net_wrench
+from sessions.perception.weighing.joint_errors import STEP_rad, joint_errors, turned_wrenches
 
 _GAIN = 0.01
-"""Error of a force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""
+"""Error of each force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""
 _LEAST_WEIGHT_N = 0.05
 _DRAG_N, _DRAG_SHARE = 0.035, 0.12
 """Error of a measured friction: an object that has only begun to slide is held back by less, and so is one that turns
@@ -30,8 +30,11 @@ _UNSTEADY_N, _UNSTEADY_SHARE = 0.02, 0.01
 """By how much the upward force on an object that hangs free varies; an edge on the table slips and catches."""
 _SIDEWAYS_SIGMAS = 4.0
 """A force along the table that is larger than this, in standard deviations, is no error of the joint angles."""
-_SMOOTHING = 1.0
+_SMOOTHING, _SLIP_SMOOTHING = 1.0, 3.0
 """Samples; of the upward force, against noise."""
+_SLIPS_N, _SLIPS_SHARE = 0.05, 0.02
+"""By how much the upward force on an object changes when it slips in the fingers, or comes down on something."""
+_LEAST_SAMPLES = 20
 _SLIDING_QUANTILE = 0.6
 """The dragged object lags behind when the hand turns round: the stronger pulls are those at which it slides."""
 _SPEED_SHARE = 0.5
@@ -107,27 +110,36 @@ def hanging(
         joint_sigma_rad: constant error of each joint angle.
         height_m: of the contacts above the table: forces there that do not cancel make moments.
     """
-    found = net_wrench(samples, fingertips, side)
+    felt, turned = net_wrench(samples, fingertips, side), turned_wrenches(samples, fingertips, side)
+    errors = joint_errors(felt, turned, joint_sigma_rad)
+    found = net_wrench(samples, fingertips, side, errors.turned_rad)
     best = _measured(found, height_m)
-    turned = np.eye(len(JOINTS)) * joint_sigma_rad
-    others = [
-        _measured(net_wrench(samples, {finger: tip}, side, turn), height_m, found, finger_alone)
-        for finger, tip in fingertips.items()
-        for finger_alone in [net_wrench(samples, {finger: tip}, side)]
-        for turn in turned[[name.startswith(finger) for name in JOINTS]]
-    ]
-    spread = np.square(np.array(others) - best).sum(axis=0)
+    by_joint = (np.array([_measured(each, height_m) for each in turned]) - _measured(felt, height_m)) / STEP_rad
+    spread = np.einsum("ik,ij,jk->k", by_joint, errors.covariance, by_joint)
     centre_m = np.append(best[1:3], height_m)
     sigma = np.sqrt(spread + _drift(fingertips, best[0], found.tips_m.mean(axis=0) - centre_m) ** 2)
+    alone = [net_wrench(samples, {finger: tip}, side, errors.turned_rad) for finger, tip in fingertips.items()]
+    carried_N = [float(each.force_N[:, 2].mean()) for each in alone]
     return Hanging(
         weight_N=float(best[0]),
-        weight_sigma_N=float(np.hypot(sigma[0], _GAIN * best[0])),
+        weight_sigma_N=float(np.linalg.norm([sigma[0], *(_GAIN * each_N for each_N in carried_N)])),
         centre_m=best[1:3],
         centre_sigma_m=sigma[1:3],
         held_back_N=abs(_held_back_N(found)),
         unsteady_N=float(gaussian_filter1d(found.force_N[:, 2], _SMOOTHING, mode="nearest").std()),
         sideways_sigmas=float(np.linalg.norm(best[3:] / sigma[3:])),
     )
+
+
+def until_it_slips(
+    samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side
+) -> CarrySamples | None:
+    """The samples of an object that hung free, until it slipped, or all; None if it slipped at once."""
+    upward_N = gaussian_filter1d(net_wrench(samples, fingertips, side).force_N[:, 2], _SLIP_SMOOTHING, mode="nearest")
+    usual_N = float(np.median(upward_N[:_LEAST_SAMPLES]))
+    slips = np.flatnonzero(np.abs(upward_N - usual_N) > _SLIPS_N + _SLIPS_SHARE * usual_N)
+    steady = len(upward_N) if not len(slips) else int(slips[0]) - _LEAST_SAMPLES // 2
+    return samples.until(int(samples.stamps_ns[steady - 1])) if steady > _LEAST_SAMPLES else None
 
 
 def dragging(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> Dragging:
@@ -137,17 +149,9 @@ def dragging(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip
     return Dragging(friction_N, float(np.hypot(_DRAG_N, _DRAG_SHARE * friction_N)), -float(found.force_N[:, 2].mean()))
 
 
-def _measured(
-    wrench: NetWrench, height_m: float, whole: NetWrench | None = None, instead_of: NetWrench | None = None
-) -> Array:
-    """Weight (N), centre (m, m) and force along the table (N, N), shape (5,); of ``whole`` with one part of it replaced
-    by ``wrench``.
-    """
-    force, moment = wrench.force_N.mean(axis=0), wrench.moment_Nm.mean(axis=0)
-    if whole is not None and instead_of is not None:
-        force = force + (whole.force_N - instead_of.force_N).mean(axis=0)
-        moment = moment + (whole.moment_Nm - instead_of.moment_Nm).mean(axis=0)
-    palm = wrench.palm_m.mean(axis=0)
+def _measured(wrench: NetWrench, height_m: float) -> Array:
+    """Weight (N), centre (m, m) and force along the table (N, N), shape (5,)."""
+    force, moment, palm = wrench.force_N.mean(axis=0), wrench.moment_Nm.mean(axis=0), wrench.palm_m.mean(axis=0)
     below_m, weight_N = height_m - palm[2], max(float(force[2]), _LEAST_WEIGHT_N)
     x = (below_m * force[0] - moment[1]) / weight_N
     y = (below_m * force[1] + moment[0]) / weight_N

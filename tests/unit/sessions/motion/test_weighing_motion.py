@@ -26,7 +26,7 @@ FREE, STANDS = hanging(0.01), hanging(0.2)
 class RecordingMotion:
     """Keeps the heights and what is told to the runtime."""
 
-    def __init__(self, held_N=3.0, hangings=(FREE,)):
+    def __init__(self, held_N=3.0, hangings=(FREE, FREE)):
         told, found = [], iter(hangings)
         self.told = told
         names = ("begin_hold", "begin_dragging", "end_dragging", "begin_hanging", "end_hanging")
@@ -62,17 +62,33 @@ def weigh(motion, holding=lambda: ALL, is_pressed=lambda: False, hold=lambda for
 def test_an_object_is_dragged_lifted_and_set_down():
     motion = RecordingMotion()
     assert weigh(motion) is LiftEnd.HUNG
-    assert motion.told == ["begin_hold", "begin_dragging", "end_dragging", "begin_hanging", "end_hanging"]
+    assert motion.told == ["begin_hold", "begin_dragging", "end_dragging", *["begin_hanging", "end_hanging"] * 2]
     assert max(motion.heights_m) == pytest.approx(LIFTS_m[0])
     assert motion.heights_m[-1] == pytest.approx(0.0)
 
 
 def test_one_that_stands_on_an_edge_is_held_more_firmly_and_lifted_higher():
-    motion, forces_N = RecordingMotion(hangings=(STANDS, FREE)), []
+    motion, forces_N = RecordingMotion(hangings=(STANDS, FREE, FREE)), []
     assert weigh(motion, hold=forces_N.append) is LiftEnd.HUNG
-    assert motion.told[-4:] == ["begin_hanging", "end_hanging"] * 2
+    assert motion.told[-6:] == ["begin_hanging", "end_hanging"] * 3
     assert max(motion.heights_m) == pytest.approx(LIFTS_m[1])
-    assert sorted(set(forces_N)) == pytest.approx([0.8, 1.8])
+    assert {0.8, 1.8} <= set(forces_N)
+
+
+def test_while_it_hangs_it_is_squeezed_more_and_less_at_one_place_and_then_as_before():
+    motion, forces_N = RecordingMotion(), []
+    last = lambda first, all_: [first, *all_][-1]  # noqa: E731
+    hold = lambda force_N: forces_N.append((force_N, last("", motion.told), last(0.0, motion.heights_m)))  # noqa: E731
+    assert weigh(motion, hold=hold) is LiftEnd.HUNG
+    swung = [each for each in forces_N if each[0] != 0.8]
+    assert [min(swung)[0], max(swung)[0]] == pytest.approx([0.8, 1.0], abs=2e-3)
+    assert {(told, round(height_m, 9)) for _, told, height_m in swung} == {("begin_hanging", LIFTS_m[0])}
+
+
+def test_what_stands_is_not_squeezed_more_and_less():
+    motion, forces_N = RecordingMotion(hangings=[STANDS] * len(LIFTS_m)), []
+    assert weigh(motion, hold=forces_N.append) is LiftEnd.HELD
+    assert set(forces_N) == {0.8, 1.8}
 
 
 def test_one_that_never_hangs_free_is_set_down_again():
@@ -83,7 +99,7 @@ def test_one_that_never_hangs_free_is_set_down_again():
 
 
 def test_a_hand_that_presses_on_what_it_sets_down_goes_back_a_little_and_lifts_no_more():
-    motion = RecordingMotion(hangings=(STANDS, FREE))
+    motion = RecordingMotion(hangings=(STANDS, FREE, FREE))
     set_down = lambda: motion.told[-1] == "end_hanging" and motion.heights_m[-1] < 0.01  # noqa: E731
     assert weigh(motion, is_pressed=set_down) is LiftEnd.ABOVE
     assert motion.told.count("end_hanging") == 1

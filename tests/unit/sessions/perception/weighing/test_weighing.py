@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.carrying.net_wrench import upward_N
 from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
-from sessions.perception.weighing.weighing import Dragging, dragging, hanging
+from sessions.perception.weighing.weighing import Dragging, dragging, hanging, until_it_slips
 from sessions.recording.session_events import EventKind, SessionEvent
 from tests.support.held_samples import CENTRE_m, HEIGHT_m, held_samples
 
@@ -61,6 +62,18 @@ def test_joint_angles_that_are_wrong_by_what_is_stated_stay_within_the_stated_er
     assert np.sqrt(np.mean(np.square(off))) < 1.5
 
 
+def test_a_squeeze_that_swings_tells_what_wrong_joint_angles_add_to_the_weight():
+    rng, off_N = np.random.default_rng(1), {0.0: [], 0.3: []}
+    for swing, found_N in off_N.items():
+        true = held_samples(0.0, MASS_kg * GRAVITY, swing=swing)
+        for _ in range(10):
+            wrong = replace(true, joints_rad=true.joints_rad + rng.normal(0.0, JOINT_SIGMA_rad, len(JOINTS)))
+            found = hanging(wrong, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+            found_N.append(found.weight_N - MASS_kg * GRAVITY)
+    at_rest_N, swung_N = (float(np.sqrt(np.mean(np.square(found_N)))) for found_N in off_N.values())
+    assert swung_N < 0.4 * at_rest_N
+
+
 def test_an_edge_that_still_stands_on_the_table_is_noticed():
     found = hanging(held_samples(pull_N=0.3, upward_N=2.0), TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
     assert found.held_back_N == pytest.approx(0.3, abs=1e-6)
@@ -101,6 +114,42 @@ def test_the_upward_force_now_is_that_of_the_newest_readings():
     TIPS["FF"].wrench = np.array([0.0, 0.0, -1.5, 0.0, 0.0, 0.0])
     assert upward_N(TIPS, np.tile(np.eye(3), (5, 1, 1))) == pytest.approx(1.5)
     TIPS["FF"].wrench = np.zeros(6)
+
+
+def test_what_slips_in_the_fingers_is_believed_until_then():
+    samples = held_samples(0.0, MASS_kg * GRAVITY)
+    assert len(until_it_slips(samples, TIPS, "right").stamps_ns) == len(samples.stamps_ns)
+    samples.readings[36:] *= 0.7
+    assert 20 <= len(until_it_slips(samples, TIPS, "right").stamps_ns) < 36
+    samples.readings[25:] *= 0.7
+    assert until_it_slips(samples, TIPS, "right") is None
+
+
+def test_of_one_lift_the_more_certain_weight_counts_and_the_first_centre():
+    wrong = np.random.default_rng(3).normal(0.0, JOINT_SIGMA_rad, len(JOINTS))
+    still, swinging = (held_samples(0.0, MASS_kg * GRAVITY, swing=swing) for swing in (0.0, 0.3))
+    liftings = ([still], [still, swinging], [still, held_samples(pull_N=0.3, upward_N=2.0)])
+    (alone,), (swung,), (caught,) = (weighed(each, wrong).hangings for each in liftings)
+    assert swung[1].weight_sigma_N < 0.8 * alone[1].weight_sigma_N
+    np.testing.assert_array_equal(swung[1].centre_m, alone[1].centre_m)
+    assert caught[1].weight_N == alone[1].weight_N
+
+
+def weighed(liftings, wrong_rad):
+    """What scales know after the liftings of one grasp, with joint angles that are wrong."""
+    left = iter([replace(each, joints_rad=each.joints_rad + wrong_rad) for each in liftings])
+    still = SimpleNamespace(
+        samples_since=lambda stamp_ns: next(left),
+        carried_until=lambda stamp_ns: None,
+        fingertips=TIPS,
+        contact_height_m=HEIGHT_m,
+        odometry=SimpleNamespace(),
+    )
+    scales = Scales(still, "right", JOINT_SIGMA_rad)
+    for _ in liftings:
+        scales.event(SessionEvent(EventKind.HANG_BEGIN, 1), 0)
+        scales.event(SessionEvent(EventKind.HANG_END, 2), 0)
+    return scales.properties
 
 
 def known():
