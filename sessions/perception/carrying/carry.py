@@ -11,7 +11,7 @@ from gtsam import Pose2
 from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.protocol.palm_images import Side
-from sessions.perception.carrying.carry_noise import CarryNoise
+from sessions.perception.carrying.carry_noise import CarryNoise, LinkTimes
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
 from sessions.perception.carrying.lifted import lifted_motions, raised
@@ -122,17 +122,16 @@ class CarryOdometry:
         half_width_m = min(max(half_m, _LEAST_HALF_WIDTH_m), _LARGEST_HALF_WIDTH_m)
         return self.measured.known(Friction(half_width_m=half_width_m))
 
-    def closed(self, sigma: StepSigma, closing_N: float, pushed_s: float = 0.0, landed_s: float = 0.0) -> StepSigma:
+    def closed(self, sigma: StepSigma, closing_N: float, links: LinkTimes = LinkTimes()) -> StepSigma:  # noqa: B008
         """How well the object's place is known once the hand has closed again.
 
         Args:
             sigma: before.
             closing_N: largest net force of the fingertips meanwhile.
-            pushed_s: how long links pushed.
-            landed_s: how long they were on the object when the hand came down before.
+            links: how long links pushed.
         """
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
-        causes = self._scale * np.array([excess_N, pushed_s, landed_s])
+        causes = self._scale * np.array([excess_N, links.pushed_s, links.landed_s, float(links.opened_s > 0.0)])
         translation_m = np.linalg.norm([sigma.translation_m, *causes * noise.after_m])
         rotation_rad = np.linalg.norm([sigma.rotation_rad, *causes * noise.after_rad])
         return StepSigma(float(translation_m), float(rotation_rad))

@@ -8,6 +8,21 @@ import numpy as np
 
 
 @dataclass(frozen=True)
+class LinkTimes:
+    """For how long links were on the object after a carry, which feel nothing; seconds.
+
+    Attributes:
+        pushed_s: while the hand closed again.
+        landed_s: while it came down before.
+        opened_s: while it opened.
+    """
+
+    pushed_s: float = 0.0
+    landed_s: float = 0.0
+    opened_s: float = 0.0
+
+
+@dataclass(frozen=True)
 class CarryNoise:
     """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83).
 
@@ -23,6 +38,7 @@ class CarryNoise:
         closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
         links_m_s, links_rad_s: for each second in which links pushed meanwhile.
         landed_m_s, landed_rad_s: for each second in which links were on the object when the hand came down before.
+        opened_m, opened_rad: where links pushed while the hand opened.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
@@ -45,14 +61,16 @@ class CarryNoise:
     links_rad_s: float = float(np.deg2rad(3.0))
     landed_m_s: float = 0.007
     landed_rad_s: float = float(np.deg2rad(10.0))
+    opened_m: float = 0.0008
+    opened_rad: float = float(np.deg2rad(1.0))
     unseen: float = 0.5
 
     @property
-    def after_m(self) -> tuple[float, float, float]:
-        """Of what happens once the hand is open: net force, links that push, links that land."""
-        return self.closed_m_N, self.links_m_s, self.landed_m_s
+    def after_m(self) -> tuple[float, float, float, float]:
+        """Of what happens once the hand lets go: net force, links that push, links that land, links while it opens."""
+        return self.closed_m_N, self.links_m_s, self.landed_m_s, self.opened_m
 
     @property
-    def after_rad(self) -> tuple[float, float, float]:
+    def after_rad(self) -> tuple[float, float, float, float]:
         """The same of the turn."""
-        return self.closed_rad_N, self.links_rad_s, self.landed_rad_s
+        return self.closed_rad_N, self.links_rad_s, self.landed_rad_s, self.opened_rad

@@ -11,12 +11,16 @@ from drivers.core.fingertip import ContinuousFingertip, FingertipSensor
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry import Carry, CarryOdometry
+from sessions.perception.carrying.carry_noise import LinkTimes
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.force_delay import ForceDelay
 from sessions.perception.carrying.link_pushes import LinkPushes
 from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.carrying.slip import Slip, slip
 from sessions.perception.touch_capture import Measured
+
+_OPENING_ns = 1_200_000_000
+"""The hand has let go by then, and has not begun to travel."""
 
 
 class HeldObject:
@@ -40,11 +44,11 @@ class HeldObject:
         motors: MotorMap | None = None,
     ) -> None:
         self.fingertips = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
-        self._record, self._descent = CarryRecord(self.fingertips), CarryRecord(self.fingertips)
+        self._record, self._descent, self._opening = (CarryRecord(self.fingertips) for _ in range(3))
         self.odometry = CarryOdometry(self.fingertips, side, scale)
         """Estimates the carries."""
 
-        self._from_ns, self._tared_ns, self._side = 0, 0, side
+        self._from_ns, self._tared_ns, self._opened_ns, self._side = 0, 0, 0, side
         self._links = None if motors is None else LinkPushes(motors, self.fingertips, side)
         self.delay = ForceDelay(self.fingertips, side)
         """How late forces arrive."""
@@ -52,6 +56,8 @@ class HeldObject:
         """How long links pushed while the hand closed for the last capture."""
         self.landed_s, self._is_grasped = 0.0, False
         """How long they were on the object while the hand came down for it."""
+        self.opened_s = 0.0
+        """How long they pushed while the hand opened after the last hold."""
         self.closing_N = 0.0
         """Largest net force of the fingertips along the table while the hand closed for the last capture.
 
@@ -68,18 +74,23 @@ class HeldObject:
     @property
     def is_watched(self) -> bool:
         """Whether an object is grasped, or is going to be, and :meth:`on_hand` is wanted."""
-        return self._record.is_open or self._descent.is_open
+        return any(record.is_open for record in self._records)
+
+    @property
+    def _records(self) -> tuple[CarryRecord, ...]:
+        return self._record, self._descent, self._opening
 
     def on_hand(
         self, stamp_ns: int, joints_rad: Array, world_T_forearm: Array, motor_counts: Array | None = None
     ) -> None:
         """Joint angles, shape (24,), the forearm's pose, shape (4, 4), and the motors' strain gauges, shape (20,)."""
-        for record in (self._record, self._descent):
+        for record in self._records:
             if record.is_open:
                 record.take(stamp_ns, joints_rad, world_T_forearm, motor_counts)
 
     def on_tare(self, stamp_ns: int) -> None:
         """The hand is above the object and free, and comes down for it; or it has risen to come down again."""
+        self._have_opened()
         self._come_down(stamp_ns)
         self._record.end()
         if self._is_grasped:
@@ -87,6 +98,14 @@ class HeldObject:
         if self._links is not None:
             self._tared_ns = stamp_ns
             self._descent.begin()
+
+    def _have_opened(self) -> None:
+        """Whatever links did just after the hold counts; later the hand rises, and its motors work for that."""
+        opening = self._opening.since(self._opened_ns) if self._opening.is_open else None
+        opening = None if opening is None else opening.until(self._opened_ns + _OPENING_ns)
+        if opening is not None and self._links is not None:
+            self.opened_s = self._links.opened_s(opening)
+        self._opening.end()
 
     def _come_down(self, until_ns: int) -> None:
         """Whatever links landed on from the tare until now counts."""
@@ -98,6 +117,7 @@ class HeldObject:
 
     def on_close(self, stamp_ns: int) -> None:
         """The fingers begin to close; the object may be pushed."""
+        self._have_opened()
         self._come_down(stamp_ns)
         self._from_ns = stamp_ns
         self._record.begin()
@@ -126,8 +146,8 @@ class HeldObject:
 
     def on_left(self) -> None:
         """The object is not held."""
-        self._record.end()
-        self._descent.end()
+        for record in self._records:
+            record.end()
 
     def samples_since(self, stamp_ns: int) -> CarrySamples | None:
         """Readings of hand and fingertips since a moment of this grasp; None for too little."""
@@ -146,7 +166,8 @@ class HeldObject:
 
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
-        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, self.pushed_s, self.landed_s)
+        pushes = LinkTimes(self.pushed_s, self.landed_s, self.opened_s)
+        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, pushes)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
         """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""
@@ -155,3 +176,9 @@ class HeldObject:
         if until_ns is None:
             self._record.end()
         return self.carry
+
+    def on_open(self, stamp_ns: int) -> None:
+        """The hold has ended, and the hand begins to open; links may push the object."""
+        self._opened_ns, self.opened_s = stamp_ns, 0.0
+        if self._links is not None:
+            self._opening.begin()

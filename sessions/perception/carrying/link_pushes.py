@@ -45,6 +45,8 @@ _LEAST_COUNTS, _SIGMAS = 14.0, 4.0
 """Of a push: more than this, and more than so many robust standard deviations of the free motions."""
 _PUSH_SAMPLES = 6
 """In a row."""
+_OPENED_COUNTS = 60.0
+"""Of a push while the hand opens."""
 _LANDED_COUNTS, _STILL_rad_s = 30.0, 0.15
 """Of a landing; open fingers that come down freely stay within 30 counts."""
 _FIT_SAMPLES, _FITS = 20, 6
@@ -90,6 +92,18 @@ class LinkPushes:
         coefficients, limits = _free_motions(self._closings)
         beyond = np.abs(newest.counts - np.einsum("nmk,mk->nm", newest.terms, coefficients)) > limits
         return self._time_s(beyond & newest.usable)
+
+    def opened_s(self, samples: CarrySamples) -> float:
+        """How long links of untouched fingers pushed while the hand opened, the fingers' times added.
+
+        Fingers that open are faster than those that close, and those tell less of how they move freely.
+        """
+        if not self._closings or samples.motor_counts is None or np.isnan(samples.motor_counts).any():
+            return 0.0
+        opening = self._closing(samples, samples.motor_counts)
+        coefficients, limits = _free_motions(self._closings)
+        off = np.abs(opening.counts - np.einsum("nmk,mk->nm", opening.terms, coefficients))
+        return self._time_s((off > _OPENED_COUNTS) & np.isfinite(limits) & opening.usable)
 
     def landed_s(self, samples: CarrySamples) -> float:
         """How long links were on something while the open hand came down, the fingers' times added."""
