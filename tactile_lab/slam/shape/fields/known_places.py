@@ -61,14 +61,26 @@ def inside_at(gpis: Gpis, places_m: Array) -> Gpis:
     return _tell(gpis, places_m, -DEPTH_m)
 
 
-def _tell(gpis: Gpis, places_m: Array, value_m: float) -> Gpis:
+def wall_at(gpis: Gpis, places_m: Array, outward: Array, sigma_m: Array) -> Gpis:
+    """The field with a wall through places, shape (q, d): inside on one side of it, outside on the other.
+
+    Args:
+        gpis: normals are observed.
+        places_m, outward: on the wall, and unit vectors across it, shape (q, d) each.
+        sigma_m: how uncertain the wall's place is, shape (q,).
+    """
+    field = _tell(gpis, places_m - DEPTH_m * outward, -DEPTH_m, np.maximum(sigma_m, DEPTH_m))
+    return _tell(field, places_m + DEPTH_m * outward, DEPTH_m, np.maximum(sigma_m, DEPTH_m))
+
+
+def _tell(gpis: Gpis, places_m: Array, value_m: float, sigma_m: Array | float = DEPTH_m) -> Gpis:
     """The field with further observed values."""
     seen, count = gpis.observations, len(places_m)
     observations = replace(
         seen,
         points_m=np.vstack([seen.points_m, places_m]),
         values_m=np.append(seen.values_m, np.full(count, value_m)),
-        value_sigma_m=np.append(seen.value_sigma_m, np.full(count, DEPTH_m)),
+        value_sigma_m=np.append(seen.value_sigma_m, np.broadcast_to(sigma_m, count)),
     )
     return Gpis(gpis.contacts_m, gpis.normals, gpis.settings, observations, gpis.kernel, gpis.prior, gpis.noise_scale)
 

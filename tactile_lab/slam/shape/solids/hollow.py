@@ -26,9 +26,9 @@ _UPWARD, _SIDEWAYS = 0.7, 0.7
 """Least vertical part of a normal on the rim, and largest of one on a wall."""
 
 _RIM_m, _LEAST_RIM_CONTACTS = 0.020, 3
-_BELOW_RIM_m, _INSIDE_m, _WITHIN_m = 0.004, 0.001, 0.008
-"""A finger is in a cavity so far below the rim, so deep in what the model takes for solid, and over what it takes for
-solid so far from its sides: not beside a neck, over a shoulder.
+_BELOW_RIM_m, _WITHIN_m = 0.004, 0.008
+"""A finger is in a cavity so far below the rim, over what the model takes for solid so far from its sides: not beside a
+neck, over a shoulder.
 """
 
 _GRID_m = 0.003
@@ -47,6 +47,7 @@ class Hollow:
         body: the model whose outside it has.
         outside: the body's surface.
         gpis: the field of all contacts.
+        middle_m: of the rim, shape (3,).
         wall_m: thickness of the wall.
         rim_m: height of the rim.
         entered_m: lowest height at which a finger was in the cavity.
@@ -56,6 +57,7 @@ class Hollow:
     body: FittedShape
     outside: SurfaceMesh
     gpis: Gpis
+    middle_m: Array
     wall_m: float
     rim_m: float
     entered_m: float
@@ -103,7 +105,7 @@ class _HollowField:
     def __init__(self, shape: Hollow) -> None:
         mesh = shape.outside
         self._shape, self._body = shape, SolidField(mesh, mesh.sigma_m)
-        self._walls = _walls(mesh)
+        self._walls = _walls(mesh, shape.middle_m)
         self.contacts_m = np.vstack([shape.gpis.contacts_m, mesh.vertices[mesh.vertices.argmin(axis=0)]])
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
@@ -151,14 +153,14 @@ def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_
     if not len(low_m):
         return shape
     mesh = shape.mesh(_GRID_m, floor_m)
-    body, walls = SolidField(mesh, 0.0), _walls(mesh)
+    body, walls = SolidField(mesh, 0.0), _walls(mesh, on_rim_m.mean(axis=0))
     below_m = np.column_stack([low_m[:, :2], np.full(len(low_m), (rim_m + floor_m) / 2)])
-    in_cavity = (body.predict(low_m).mean_m < -_INSIDE_m) & (body.predict(below_m).mean_m < -_WITHIN_m)
+    in_cavity = body.predict(below_m).mean_m < -_WITHIN_m
     away_m, _ = _from_walls(gpis.contacts_m[up & (heights_m > (rim_m + floor_m) / 2)], *walls)
     if not in_cavity.any() or away_m.max() > _THICKNESS_m[1]:
         return shape
     wall_m = float(np.clip(2 * _from_walls(on_rim_m, *walls)[0].mean(), *_THICKNESS_m))
-    hollow = Hollow(shape, mesh, gpis, wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
+    hollow = Hollow(shape, mesh, gpis, on_rim_m.mean(axis=0), wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
     off_m = np.abs(hollow.field.predict(gpis.contacts_m).mean_m)
     before_m = np.abs(body.predict(gpis.contacts_m).mean_m)
     return hollow if np.sum(off_m > _OFF_m) <= np.sum(before_m > _OFF_m) else shape
@@ -172,13 +174,16 @@ def _surrounded(places_m: Array, around_m: Array) -> Mask:
         return np.zeros(len(places_m), dtype=bool)
 
 
-def _walls(mesh: SurfaceMesh) -> tuple[Array, Array]:
-    """Vertices and triangles of the walls of a surface."""
+def _walls(mesh: SurfaceMesh, middle_m: Array) -> tuple[Array, Array]:
+    """Vertices and triangles of the walls of a surface that face away from the middle of the rim, shape (3,): a model
+    that was told of a finger inside may have a dent there.
+    """
     vertices, faces = mesh_arrays(mesh)
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
-    return vertices, np.ascontiguousarray(faces[np.abs(normals[:, 2]) < _SIDEWAYS * lengths])
+    outward = np.einsum("nk,nk->n", (corners.mean(axis=1) - middle_m)[:, :2], normals[:, :2]) > 0
+    return vertices, np.ascontiguousarray(faces[outward & (np.abs(normals[:, 2]) < _SIDEWAYS * lengths)])
 
 
 def _from_walls(points_m: Array, vertices: Array, faces: Array) -> tuple[Array, Array]:

@@ -35,7 +35,8 @@ class ContactSet:
         free_m: places known to be outside of the object when these contacts were made, shape (q, d), same frame.
         free_of: the contact whose finger was at each of them, -1 for a finger without contact, shape (q,).
         shared: errors that contacts of one finger share.
-        by_touch: made by fingers that touched without closing, so that nothing pushed the object.
+        probed: which were made by fingers that touched before the hand closed, so that nothing had pushed the object,
+            shape (n,); empty where that is not known.
     """
 
     points_m: Array
@@ -45,7 +46,7 @@ class ContactSet:
     free_m: Array = field(default_factory=lambda: np.empty((0, 0)))
     free_of: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     shared: SharedErrors = NO_SHARED_ERRORS
-    by_touch: bool = False
+    probed: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=bool))
 
     def __len__(self) -> int:
         return len(self.points_m)
@@ -53,6 +54,11 @@ class ContactSet:
     @property
     def dimension(self) -> int:
         return int(self.points_m.shape[1])
+
+    @property
+    def by_touch(self) -> bool:
+        """Whether there are contacts, and the hand did not close for any."""
+        return len(self.probed) > 0 and bool(self.probed.all())
 
     @cached_property
     def free_ahead_m(self) -> Array:
@@ -98,8 +104,8 @@ class ContactSet:
         normal_sigma = np.maximum(normal_sigma, LEAST_SIGMA_rad)
         seen = cls((points - heights)[:, :dimension], normals[:, :dimension].copy(), along_normal, normal_sigma)
         free, free_of = _free_places(grasp, seen, counted, heights)
-        by_touch = bool(grasp.contacts) and all(contact.probed for contact in grasp.contacts)
-        return replace(seen, free_m=free, free_of=free_of, shared=SharedErrors.of(counted, normals), by_touch=by_touch)
+        probed = np.array([contact.probed for contact in counted], dtype=bool)
+        return replace(seen, free_m=free, free_of=free_of, shared=SharedErrors.of(counted, normals), probed=probed)
 
     @classmethod
     def concatenate(cls, parts: Sequence[ContactSet]) -> Self:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import gammaln
 
 from drivers.core.contacts import Array
-from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
+from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
@@ -98,8 +98,8 @@ class HypothesisScorer:
     def clean(self, contact_map: ContactMap, grasp: int | None = None) -> tuple[ContactMap, float]:
         """Leave out contacts, the worst first, while they cost more than unexplained contacts.
 
-        Contacts of fingers that only touched an object left in place stay: where it was is known, and a field may be
-        wrong beside an edge however sure it is.
+        Contacts of fingers that touched an object left in place before the hand closed stay: where it was is known, and
+        a field may be wrong beside an edge however sure it is.
 
         Args:
             contact_map: with its present poses.
@@ -108,9 +108,8 @@ class HypothesisScorer:
         Returns:
             The map, and the negative log posterior of its poses.
         """
-        asked_grasps = self._asked_grasps(contact_map, grasp)
         while True:
-            asked = np.flatnonzero(asked_grasps[contact_map.grasp_indices])
+            asked = self._asked(contact_map, grasp)
             costs = contact_map.fit().leave_one_out_costs(asked)
             if len(asked) == 0 or costs.max() <= self._unexplained_cost or len(contact_map.grasp_indices) == 1:
                 return contact_map, self._misfit(contact_map)
@@ -122,11 +121,20 @@ class HypothesisScorer:
         motion = MotionCost.of(contact_map, self._noise).value(contact_map.rows)
         return motion + float(np.minimum(each, self._unexplained_cost).sum()) + self.price(contact_map)
 
-    def _asked_grasps(self, contact_map: ContactMap, grasp: int | None) -> NDArray[np.bool_]:
-        """Which grasps' contacts may be left out, shape (g,)."""
-        sure = [one.contacts_world.by_touch and one.was_left(self._noise) for one in contact_map.placed]
-        named = np.arange(len(sure)) == grasp if grasp is not None else True
-        return ~np.array(sure, dtype=bool) & named
+    def _asked(self, contact_map: ContactMap, grasp: int | None) -> NDArray[np.intp]:
+        """Indices of the contacts that may be left out, of one grasp or of all."""
+        surely = [self._surely_there(one) for one in contact_map.placed]
+        named = contact_map.grasp_indices == grasp if grasp is not None else True
+        return np.flatnonzero(~np.concatenate(surely) & named)
+
+    def _surely_there(self, grasp: PlacedGrasp) -> NDArray[np.bool_]:
+        """Of the contacts of a grasp that are part of the shape, those of fingers that touched before it closed on an
+        object left in place.
+        """
+        probed = grasp.contacts_world.probed
+        if not len(probed) or not grasp.was_left(self._noise):
+            return np.zeros(len(grasp.kept), dtype=bool)
+        return probed[grasp.kept]
 
     def different(self, hypotheses: list[Hypothesis], *, by_contacts: bool = True) -> list[Hypothesis]:
         """The most likely ones of those with equal trajectories.
