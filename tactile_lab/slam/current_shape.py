@@ -131,6 +131,8 @@ def _extract(
         contour = shape.contour(resolution_m)
         return propagate_pose_uncertainty(contour, shape, contact_map, settings.motion) if uncertain else contour
     mesh = shape.mesh(resolution_m, floor_m)
+    if stands and (top_m := contact_map.top_m) is not None:
+        mesh = mesh.below(top_m)
     return propagate_pose_uncertainty(mesh, shape, contact_map, settings.motion) if uncertain else mesh
 
 

@@ -83,6 +83,12 @@ class SurfaceMesh:
     known: Mask | None = None
     shared_sigma_m: float = 0.0
 
+    def below(self, top_m: float) -> SurfaceMesh:
+        """The surface with what is higher than ``top_m`` pressed down to there."""
+        over = self.vertices[:, 2] > top_m
+        vertices = np.column_stack([self.vertices[:, :2], np.minimum(self.vertices[:, 2], top_m)])
+        return replace(self, vertices=vertices, normals=np.where(over[:, None], [0.0, 0.0, 1.0], self.normals))
+
 
 def extract_contour(field: SurfaceField, *, resolution_m: float = 0.001, largest_margin_m: float = 0.060) -> Contour:
     """The outline of the object in a planar field.

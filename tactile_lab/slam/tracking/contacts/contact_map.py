@@ -23,6 +23,11 @@ _WHATEVER_THE_POSES = ("contacts_world", "grasp_indices", "_free_world")
 _WRONG_BY_m = 0.018
 """Farther than this before a contact that is left out, its finger was on its way, however wrong the contact is."""
 
+_UPWARD, _SAME_TOP_m, _ABOVE_m = 0.7, 0.010, 0.003
+"""A fingertip laid on with a normal that rises so has looked for the top; it was there if nothing was met so far above
+it; and so far over the highest contact the object surely ends, whatever a contact is off.
+"""
+
 WHILE_TRACKING_m = 0.080
 """Longest kernel while more grasps follow: otherwise contacts on a smooth side would rule out the edge behind it."""
 
@@ -152,6 +157,21 @@ class ContactMap:
         """Free places of grasps whose contacts are part of the shape, object frame, shape (q, d)."""
         places, grasps = self._free_world
         return self.space.to_object(self.rows[grasps], places, places)[0]
+
+    @property
+    def top_m(self) -> float | None:
+        """Height over which there is nothing, object frame, of an object that stands on the table.
+
+        The top was looked for with fingertips laid on, from above the tallest thing known, and nothing taller was
+        found. Contacts that are left out count, too: a finger was there. None where the top was not looked for.
+        """
+        world = [grasp.contacts_world for grasp in self.placed if grasp.used and len(grasp.contacts_world.probed)]
+        if self.dimension == 2 or not world:
+            return None
+        tapped_m = np.concatenate([one.points_m[one.probed & (one.normals[:, 2] > _UPWARD), 2] for one in world])
+        highest_m = max(float(one.points_m[:, 2].max()) for one in world)
+        is_found = bool(len(tapped_m)) and tapped_m.max() > highest_m - _SAME_TOP_m
+        return highest_m + _ABOVE_m if is_found else None
 
     @cached_property
     def _free_world(self) -> tuple[Array, NDArray[np.intp]]:
