@@ -19,6 +19,7 @@ from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.held_out import predicts_better, predicts_better_than
 from tactile_lab.slam.shape.selection.unexplained import are_inside, unexplained
 from tactile_lab.slam.shape.solids.hollow import hollowed
+from tactile_lab.slam.shape.solids.lying import Lying
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
@@ -114,23 +115,25 @@ def _rounder(
         return best
 
     def turn(some: Gpis) -> FittedShape:
-        fit = Turned.fit if isinstance(round_, Turned) else turned_with_parts
+        fit = type(round_).fit if isinstance(round_, Turned | Lying) else turned_with_parts
         return fit(some, floor_m, free_points_m)
 
     return best if predicts_better_than(sharp, turn, gpis, _COARSE_m, floor_m) else round_
 
 
 def _revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:
-    """The solid of revolution, with a part beside it or without, whichever has most evidence; None if neither has
-    enough.
+    """The solid of revolution, standing or lying, with a part beside it or without, whichever has most evidence; None
+    if none has enough.
     """
     without = gpis.settings.without
     if "turned" in without:
         return None
-    body = _turned(gpis, free_points_m, floor_m, at_least=at_least)
+    body: FittedShape | None = _turned(gpis, free_points_m, floor_m, at_least=at_least)
+    most = at_least if body is None or body.log_evidence is None else body.log_evidence
+    lying = _lying(gpis, free_points_m, floor_m, at_least=most)
+    body, most = (body, most) if lying is None else (lying, lying.log_evidence)
     if "parts" in without:
         return body
-    most = at_least if body is None else body.log_evidence
     return _turned_with_part(gpis, free_points_m, floor_m, at_least=most) or body
 
 
@@ -190,6 +193,16 @@ def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least
     off = _LARGEST_SHARE_OFF_TURNED
     evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
     return shape if evidence > at_least else None
+
+
+def _lying(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Lying | None:
+    """The solid of revolution that lies, as :func:`_turned`. What its noise explains is no stray."""
+    shape = _try_make(lambda: Lying.fit(gpis, floor_m, free_points_m))
+    if not isinstance(shape, Lying):
+        return None
+    off = _LARGEST_SHARE_OFF_TURNED
+    checked = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if np.isfinite(checked) else None
 
 
 def _turned_with_part(

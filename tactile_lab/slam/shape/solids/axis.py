@@ -9,15 +9,19 @@ from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 
 _LEAST_WALL_CONTACTS = 12
-_LARGEST_GAP_rad = np.deg2rad(150.0)
+LARGEST_GAP_rad = float(np.deg2rad(150.0))
 """Contacts on the walls must surround the axis: a smaller part of a circle may also belong to another shape."""
 SIDEWAYS = 0.5
 """A contact tells about the axis if its unit normal's horizontal part is longer than this."""
 _ROUNDS, _OUTLYING_SIGMAS = 8, 4.0
 
 
-def find_axis(contacts: WeightedContacts) -> tuple[Array, float]:
+def find_axis(contacts: WeightedContacts, largest_gap_rad: float = LARGEST_GAP_rad) -> tuple[Array, float]:
     """The point next to the walls' normals, seen from above, and its standard deviation, by robust least squares.
+
+    Args:
+        contacts: in space, the axis along z.
+        largest_gap_rad: largest angle at the axis between neighbouring contacts.
 
     Raises:
         ShapeError: the contacts do not surround it.
@@ -34,7 +38,7 @@ def find_axis(contacts: WeightedContacts) -> tuple[Array, float]:
         variance = 1 / contacts.point_weights[walls] + reach_m**2 / contacts.normal_weights[walls]
         misses = (offsets_m - across @ axis_m) ** 2 / variance
         weights = np.maximum(1 - misses / _OUTLYING_SIGMAS**2, 0.0) ** 2 / variance
-    if _largest_gap_rad((points_m - axis_m)[weights > 0]) > _LARGEST_GAP_rad:
+    if _largest_gap_rad((points_m - axis_m)[weights > 0]) > largest_gap_rad:
         raise ShapeError("the contacts do not surround an axis")
     information = (weights[:, None] * across).T @ across
     return axis_m, float(np.sqrt(np.diag(np.linalg.inv(information)).max()))

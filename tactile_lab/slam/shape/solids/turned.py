@@ -22,7 +22,7 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.shape.fields.settings import GpisSettings
-from tactile_lab.slam.shape.solids.axis import SIDEWAYS, find_axis, misfit_around, split, to_profile
+from tactile_lab.slam.shape.solids.axis import SIDEWAYS, LARGEST_GAP_rad, find_axis, misfit_around, split, to_profile
 from tactile_lab.slam.shape.solids.mesh import area_weighted_normals
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
@@ -54,7 +54,7 @@ class Turned:
         axis_sigma_m: its standard deviation along each direction.
         half: the field of the profile, contacts at (distance from the axis, height).
         free_m: places known to be outside, in the same coordinates, shape (k, 2).
-        floor_m: height of the table.
+        floor_m: height of the table; None for an axis that does not stand on it.
         log_evidence: that of the profile and of normals in planes through the axis, minus the price of the axis.
         name: "turned".
     """
@@ -63,24 +63,31 @@ class Turned:
     axis_sigma_m: float
     half: Gpis
     free_m: Array
-    floor_m: float
+    floor_m: float | None
     log_evidence: float
     name: str = "turned"
 
     @classmethod
-    def fit(cls, gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> Self:
+    def fit(
+        cls,
+        gpis: Gpis,
+        floor_m: float | None,
+        free_points_m: Array | None = None,
+        largest_gap_rad: float = LARGEST_GAP_rad,
+    ) -> Self:
         """Fit axis and profile to the contacts of a field.
 
         Args:
             gpis: a field fitted in space.
-            floor_m: height of the table that the object stands on.
+            floor_m: height of the table that the object stands on; None if nothing is known of its lower end.
             free_points_m: places that a finger went through, shape (k, 3), or None.
+            largest_gap_rad: largest angle at the axis between neighbouring contacts.
 
         Raises:
             ShapeError: the contacts are in the plane, do not surround an axis, or their normals do not meet it.
         """
         contacts = contacts_of(gpis)
-        start_m, sigma_m = find_axis(contacts)
+        start_m, sigma_m = find_axis(contacts, largest_gap_rad)
         if misfit_around(contacts, start_m)[0] > _LARGEST_MISFIT:
             raise ShapeError("the contacts' normals do not meet one vertical axis")
         axis_m = _likeliest_axis(gpis, contacts, start_m)
@@ -93,14 +100,14 @@ class Turned:
     @cached_property
     def profile(self) -> Gpis:
         """The field of the whole section through the axis, with all that is known of places without contacts."""
-        section = standing(_both_halves(self.half, self.floor_m), self.floor_m)
+        section = _both_halves(self.half, self.floor_m)
+        section = section if self.floor_m is None else standing(section, self.floor_m)
         return in_one_piece(outside_at(section, np.vstack([self.free_m, self.free_m * [-1, 1]])), _SECTION_GRID_m)
 
     def half_of(self, contacts: WeightedContacts, chosen: NDArray[np.bool_]) -> Gpis:
         """The field of the profile of some contacts in space, about this axis and with this kernel."""
         some = WeightedContacts(*(each[chosen] for each in vars(contacts).values()))
-        half = _half(self.half.settings, some, self.axis_m)
-        return half.with_log_parameters(self.half.kernel.log_parameters)
+        return _like(self.half, _half(self.half.settings, some, self.axis_m))
 
     def predict(self, points_m: Array) -> Prediction:
         """The field of the profile, with its gradient, at points of shape (q, 3)."""
@@ -115,14 +122,15 @@ class Turned:
         raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
-        """The surface, watertight, its vertices about ``1.5 resolution_m`` apart; it always ends at the table.
+        """The surface, watertight, its vertices about ``1.5 resolution_m`` apart; it always ends at the table, if any.
 
         Raises:
             ShapeError: the profile encloses nothing.
         """
         section = extract_contour(self.profile, resolution_m=_SECTION_GRID_m)
         step_m = _SPACING * resolution_m
-        line_m, sigma_m = generatrix(section, self.floor_m if floor_m is None else floor_m, step_m)
+        floor_m = self.floor_m if floor_m is None else floor_m
+        line_m, sigma_m = generatrix(section, -np.inf if floor_m is None else floor_m, step_m)
         turned, rings = revolve(line_m, step_m)
         normals = area_weighted_normals(turned)
         sigma_m = np.hypot(sigma_m[rings], self.axis_sigma_m * np.linalg.norm(normals[:, :2], axis=1))
@@ -161,14 +169,19 @@ def _half(settings: GpisSettings, contacts: WeightedContacts, axis_m: Array) -> 
     return Gpis.fit(to_profile(contacts.points_m, axis_m), normals, *sigmas, settings)
 
 
-def _both_halves(half: Gpis, floor_m: float) -> Gpis:
-    """The field of the section on both sides of the axis, its foot continued below the table."""
+def _both_halves(half: Gpis, floor_m: float | None) -> Gpis:
+    """The field of the section on both sides of the axis, its foot continued below the table if there is one."""
     seen = half.observations
     rows = np.column_stack([half.contacts_m, half.normals, seen.value_sigma_m, seen.gradient_sigma])
-    right = np.vstack([rows, *_below_table(rows, floor_m)])
+    right = rows if floor_m is None else np.vstack([rows, *_below_table(rows, floor_m)])
     both = np.vstack([right, right * [-1, 1, -1, 1, 1, 1]])
     section = Gpis.fit(both[:, :2], both[:, 2:4], both[:, 4], both[:, 5], half.settings)
-    return section.with_log_parameters(half.kernel.log_parameters)
+    return _like(half, section)
+
+
+def _like(half: Gpis, other: Gpis) -> Gpis:
+    """Another field with the kernel and the noise of a profile's."""
+    return other.with_log_parameters(np.append(half.kernel.log_parameters, np.log(half.noise_scale)))
 
 
 def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:

@@ -85,9 +85,16 @@ class SurfaceMesh:
 
     def below(self, top_m: float) -> SurfaceMesh:
         """The surface with what is higher than ``top_m`` pressed down to there."""
-        over = self.vertices[:, 2] > top_m
-        vertices = np.column_stack([self.vertices[:, :2], np.minimum(self.vertices[:, 2], top_m)])
-        return replace(self, vertices=vertices, normals=np.where(over[:, None], [0.0, 0.0, 1.0], self.normals))
+        return self._levelled(self.vertices[:, 2] > top_m, top_m, 1.0)
+
+    def above(self, floor_m: float) -> SurfaceMesh:
+        """The surface with what is lower than ``floor_m`` pressed up to there."""
+        return self._levelled(self.vertices[:, 2] < floor_m, floor_m, -1.0)
+
+    def _levelled(self, chosen: Mask, height_m: float, up: float) -> SurfaceMesh:
+        heights_m = np.where(chosen, height_m, self.vertices[:, 2])
+        vertices = np.column_stack([self.vertices[:, :2], heights_m])
+        return replace(self, vertices=vertices, normals=np.where(chosen[:, None], [0.0, 0.0, up], self.normals))
 
 
 def extract_contour(field: SurfaceField, *, resolution_m: float = 0.001, largest_margin_m: float = 0.060) -> Contour:
