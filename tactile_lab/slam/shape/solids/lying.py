@@ -110,8 +110,8 @@ def _likeliest_rad(contacts: WeightedContacts, heading_rad: float, rough: Turned
         half = replace(rough, axis_m=axis_m).half_of(seen, everything)
         return -half.log_marginal_likelihood() - misfit_around(seen, axis_m)[1]
 
-    options = {"xatol": _TOLERANCE_rad}
-    found = minimize_scalar(cost, bounds=(-_STEP_rad, _STEP_rad), method="bounded", options=options)
+    limits = -float(_STEP_rad), float(_STEP_rad)
+    found = minimize_scalar(cost, bounds=limits, method="bounded", options={"xatol": _TOLERANCE_rad})
     return heading_rad + float(found.x)
 
 

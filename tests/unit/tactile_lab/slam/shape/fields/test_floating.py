@@ -36,6 +36,26 @@ def test_a_field_that_hangs_over_the_table_goes_on_to_it_as_wide_as_its_lowest_c
     assert (at(0.0, found) < 0).mean() > 0.8, "its foot is closed"
 
 
+def test_walls_that_lean_outward_go_on_inward() -> None:
+    slope, rim_m = np.tan(np.deg2rad(25.0)), 0.060
+    heights_m, across_m = np.linspace(0.045, TOP_m, 14), np.linspace(-rim_m, rim_m, 121)
+    out_m = rim_m + (heights_m - TOP_m) * slope
+    sides = [np.column_stack([side * out_m, heights_m]) for side in (-1.0, 1.0)]
+    normals = [np.tile(np.array([side, -slope]) / np.hypot(1.0, slope), (14, 1)) for side in (-1.0, 1.0)]
+    bowl = Gpis.fit(np.vstack(sides), np.vstack(normals), 0.0005, 0.05, GpisSettings(length_m=0.015))
+    found = standing(bowl, 0.0)
+    for height_m in (0.015, 0.03):
+        is_inside = found.mean(np.column_stack([across_m, np.full(121, height_m)])) < 0
+        half_m = np.abs(across_m[is_inside]).max()
+        assert half_m == pytest.approx(rim_m + (height_m - TOP_m) * slope, abs=0.003)
+
+
+def test_a_wall_is_no_wider_below_its_lowest_contacts() -> None:
+    found = standing(walls(0.045), 0.0)
+    beside = np.column_stack([np.full(5, HALF_m + 0.004), np.linspace(0.005, 0.04, 5)])
+    assert found.mean(beside).min() > 0
+
+
 def test_where_it_was_touched_it_stays() -> None:
     hanging = walls(0.045)
     np.testing.assert_allclose(at(0.07, standing(hanging, 0.0)), at(0.07, hanging), atol=0.0005)

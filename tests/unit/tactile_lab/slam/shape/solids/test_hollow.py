@@ -11,6 +11,7 @@ from tactile_lab.experiments.data.household import turned
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.solids.hollow import Hollow, hollowed
+from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
 
@@ -41,6 +42,14 @@ def test_a_cup_is_hollow_where_fingers_went_down_inside_its_rim() -> None:
     assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
     assert distances_to_mesh(CUP.vertices, mesh).max() < 0.006
     assert np.mean(distances_to_mesh(mesh.vertices, CUP)) < 0.0015
+
+
+def test_a_model_that_was_told_of_the_fingers_is_hollow_as_well() -> None:
+    field = felt(RADIUS_m - WALL_m / 2)
+    dented = Turned.fit(field, 0.0, IN_CUP_m)
+    hollow = hollowed(dented, field, IN_CUP_m, 0.0)
+    assert isinstance(hollow, Hollow)
+    assert np.mean(distances_to_mesh(hollow.mesh().vertices, CUP)) < 0.0015
 
 
 def test_a_cavity_is_the_less_certain_the_deeper_it_is() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gtsam import Pose3
@@ -82,3 +84,31 @@ def test_a_map_read_backward_keeps_its_own_frame_and_where_the_object_moved_free
     np.testing.assert_allclose(reread.rows, forward.rows, atol=1e-12)
     assert [each.left_out for each in reread.placed] == [each.left_out for each in forward.placed]
     assert reread.moved == (Moved.AS_MEANT, Moved.PUSHED, Moved.FREELY)
+
+
+def felt(*touches: tuple[float, float, bool]) -> PlacedGrasp:
+    """A grasp with contacts at heights, each with the vertical part of its normal and whether it was probed."""
+    contacts = tuple(
+        Contact("FF", np.array([0.0, 0.0, z]), np.array([np.sqrt(1 - up**2), 0.0, up]), probed=probed)
+        for z, up, probed in touches
+    )
+    world = ContactSet.of_grasp(Grasp(0, 0, contacts), 3, 0.02)
+    return PlacedGrasp(world, np.zeros(3), np.eye(3), np.zeros(3))
+
+
+def test_nothing_is_over_a_top_that_was_tapped() -> None:
+    settings = GpisSettings()
+    tapped = felt((0.100, 1.0, True), (0.040, 0.0, False))
+    higher = felt((0.104, 0.9, False))
+    assert ContactMap((tapped,), settings).top_m == pytest.approx(0.083)
+    assert ContactMap((tapped, higher), settings).top_m == pytest.approx(0.087)
+    assert ContactMap((tapped.put_aside(), felt((0.05, 0.0, False))), settings).top_m is None, "it has no place"
+    without_it = replace(tapped, left_out=frozenset({0}))
+    assert ContactMap((without_it,), settings).top_m == pytest.approx(0.083), "the finger was there all the same"
+
+
+def test_where_the_top_was_not_looked_for_nothing_is_known_of_it() -> None:
+    settings = GpisSettings()
+    assert ContactMap((felt((0.100, 1.0, False)),), settings).top_m is None
+    assert ContactMap((felt((0.100, 0.0, True)),), settings).top_m is None, "a side was probed"
+    assert ContactMap((felt((0.060, 1.0, True), (0.100, 0.0, False)),), settings).top_m is None, "a lower part"
