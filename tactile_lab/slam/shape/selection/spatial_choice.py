@@ -16,8 +16,16 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.model import FittedShape
+from tactile_lab.slam.shape.selection.contradictions import (
+    LARGEST_SHARE_OFF,
+    COARSE_m,
+    LEFT_OUT_nats,
+    checked_evidence,
+    try_make,
+)
 from tactile_lab.slam.shape.selection.held_out import predicts_better, predicts_better_than
-from tactile_lab.slam.shape.selection.unexplained import are_inside, unexplained
+from tactile_lab.slam.shape.selection.round_choice import revolving
+from tactile_lab.slam.shape.selection.unexplained import unexplained
 from tactile_lab.slam.shape.solids.hollow import hollowed
 from tactile_lab.slam.shape.solids.lying import Lying
 from tactile_lab.slam.shape.solids.planes import divide
@@ -26,20 +34,11 @@ from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
 from tactile_lab.slam.shape.solids.with_parts import ONE_PART_m, WithParts
-from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
-_COARSE_m = 0.006
-_FREE_SIGMA_m = 0.003
-_ON_SURFACE_m = 0.006
-_NOISE_SIGMAS = 2.0
-_LARGEST_SHARE_OFF, _LARGEST_SHARE_FILLED = 0.15, 0.05
-_LARGEST_SHARE_OFF_TURNED, _LARGEST_SHARE_OFF_WITH_PART = 0.01, 0.05
 _OUTSIDE_m = 0.012
 """Contacts so far outside of a surface, several of them near each other, are no noise."""
 _KERNEL_STEPS = 10
-_LEFT_OUT_nats = 12.0
-"""Cost of a contact that is centimetres off the surface: that of one outlier among twenty good contacts."""
 _BEYOND_DOUBT_nats = 3.0
 """A sharp solid that explains each contact this much better than the field is accepted at once. No curved object came
 near this value (2.7 at most), cross-validation takes time, and with contacts held out a face with few contacts may be
@@ -77,14 +76,14 @@ def best_spatial_shape(
     everything = gpis
     gpis, left_out_nats = (gpis, 0.0) if "strays" in without else _without_strays(gpis)
     if floor_m is not None and "standing field" not in without:
-        field = _try_make(lambda: StandingField.fit(gpis, floor_m)) or field
+        field = try_make(lambda: StandingField.fit(gpis, floor_m)) or field
     sharp: Fit | None = None
     best, most = field, -np.inf if "field" in without else field.log_evidence or -np.inf
     for fit in _candidates(gpis.settings, best_outline, free_points_m, floor_m):
-        shape = _try_make(lambda fit=fit: fit(gpis))  # type: ignore[misc]
+        shape = try_make(lambda fit=fit: fit(gpis))  # type: ignore[misc]
         if shape is None:
             continue
-        evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
+        evidence = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=most)
         if evidence > most and _earned(fit, evidence, gpis, floor_m):
             best, most, sharp = shape, evidence, fit
     if floor_m is None:
@@ -94,7 +93,7 @@ def best_spatial_shape(
         sharp = None if best is sectioned else sharp
     best = _rounder(best, sharp, everything, free_points_m, floor_m, most + left_out_nats)
     best = _with_missing_parts(best, everything, free_points_m, floor_m)
-    return _try_make(lambda: hollowed(best, everything, free_points_m, floor_m)) or best
+    return try_make(lambda: hollowed(best, everything, free_points_m, floor_m)) or best
 
 
 def _rounder(
@@ -109,8 +108,8 @@ def _rounder(
     worse: many small faces can follow a round wall.
     """
     if sharp is None:
-        return _revolving(gpis, free_points_m, floor_m, at_least=evidence) or best
-    round_ = _revolving(gpis, free_points_m, floor_m, at_least=-np.inf)
+        return revolving(gpis, free_points_m, floor_m, at_least=evidence) or best
+    round_ = revolving(gpis, free_points_m, floor_m, at_least=-np.inf)
     if round_ is None:
         return best
 
@@ -118,23 +117,7 @@ def _rounder(
         fit = type(round_).fit if isinstance(round_, Turned | Lying) else turned_with_parts
         return fit(some, floor_m, free_points_m)
 
-    return best if predicts_better_than(sharp, turn, gpis, _COARSE_m, floor_m) else round_
-
-
-def _revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:
-    """The solid of revolution, standing or lying, with a part beside it or without, whichever has most evidence; None
-    if none has enough.
-    """
-    without = gpis.settings.without
-    if "turned" in without:
-        return None
-    body: FittedShape | None = _turned(gpis, free_points_m, floor_m, at_least=at_least)
-    most = at_least if body is None or body.log_evidence is None else body.log_evidence
-    lying = _lying(gpis, free_points_m, floor_m, at_least=most)
-    body, most = (body, most) if lying is None else (lying, lying.log_evidence)
-    if "parts" in without:
-        return body
-    return _turned_with_part(gpis, free_points_m, floor_m, at_least=most) or body
+    return best if predicts_better_than(sharp, turn, gpis, COARSE_m, floor_m) else round_
 
 
 def _with_missing_parts(
@@ -154,19 +137,19 @@ def _with_missing_parts(
     if not members:
         return shape
     beside = np.isin(np.arange(len(gpis.contacts_m)), np.concatenate(members))
-    return _try_make(lambda: WithParts.of(shape, gpis, beside, floor_m, free_points_m)) or shape
+    return try_make(lambda: WithParts.of(shape, gpis, beside, floor_m, free_points_m)) or shape
 
 
 def _try_mesh(shape: FittedShape, floor_m: float | None) -> SurfaceMesh | None:
     try:
-        return shape.mesh(_COARSE_m, floor_m)
+        return shape.mesh(COARSE_m, floor_m)
     except ShapeError:  # it encloses nothing, which is told where its surface is wanted
         return None
 
 
 def _sectioned(gpis: Gpis, floor_m: float) -> FittedShape | None:
     """A standing field of what is alike along edges, its evidence reduced by the price of its parameters."""
-    shape = _try_make(lambda: StandingField.fit(DrawnField.along_edges(gpis), floor_m))
+    shape = try_make(lambda: StandingField.fit(DrawnField.along_edges(gpis), floor_m))
     return replace(shape, log_evidence=shape.log_evidence - PRICE_nats) if isinstance(shape, StandingField) else None
 
 
@@ -181,67 +164,31 @@ def _beyond_doubt(evidence: float, gpis: Gpis) -> bool:
     return evidence - gpis.log_marginal_likelihood() > _BEYOND_DOUBT_nats * len(gpis.contacts_m)
 
 
-def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Turned | None:
-    """The solid of revolution, if it has more evidence and hardly any contact is off its surface.
-
-    Its evidence is a marginal likelihood like the field's, so that no cross-validation is needed. A handle has only a
-    few contacts: the body may well be likelier without them, but then the handle would be missing.
-    """
-    shape = _try_make(lambda: Turned.fit(gpis, floor_m, free_points_m))
-    if not isinstance(shape, Turned):
-        return None
-    off = _LARGEST_SHARE_OFF_TURNED
-    evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
-    return shape if evidence > at_least else None
-
-
-def _lying(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Lying | None:
-    """The solid of revolution that lies, as :func:`_turned`. What its noise explains is no stray."""
-    shape = _try_make(lambda: Lying.fit(gpis, floor_m, free_points_m))
-    if not isinstance(shape, Lying):
-        return None
-    off = _LARGEST_SHARE_OFF_TURNED
-    checked = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
-    return shape if np.isfinite(checked) else None
-
-
-def _turned_with_part(
-    gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float
-) -> FittedShape | None:
-    """The solid of revolution with a part beside it, if it has more evidence, as :func:`_turned`."""
-    shape = _try_make(lambda: turned_with_parts(gpis, floor_m, free_points_m))
-    if shape is None:
-        return None
-    off = _LARGEST_SHARE_OFF_WITH_PART
-    evidence = _checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
-    return shape if evidence > at_least else None
-
-
 def _earned(fit: Fit, evidence: float, gpis: Gpis, floor_m: float | None) -> bool:
     """Whether a sharp solid with more evidence than the field also passes the cross-validation."""
     if not gpis.settings.without.isdisjoint({"field", "held-out contacts"}):
         return True
-    return _beyond_doubt(evidence, gpis) or predicts_better(fit, gpis, _COARSE_m, floor_m)
+    return _beyond_doubt(evidence, gpis) or predicts_better(fit, gpis, COARSE_m, floor_m)
 
 
 def _without_strays(gpis: Gpis) -> tuple[Gpis, float]:
     """The field without contacts that share a plane with no other, if it explains the rest sufficiently better, and the
     log density of those left out.
 
-    Every contact left out costs :data:`_LEFT_OUT_nats`, so that good contacts on curved parts stay.
+    Every contact left out costs :data:`LEFT_OUT_nats`, so that good contacts on curved parts stay.
     """
     contacts = contacts_of(gpis)
     planes = divide(contacts)
     kept = planes.sizes[planes.labels] > 1
-    if kept.all() or np.count_nonzero(~kept) > _LARGEST_SHARE_OFF * len(contacts):
+    if kept.all() or np.count_nonzero(~kept) > LARGEST_SHARE_OFF * len(contacts):
         return gpis, 0.0
     seen = gpis.observations
     rest = gpis.contacts_m[kept], gpis.normals[kept]
     trimmed = Gpis.fit(*rest, seen.value_sigma_m[kept], seen.gradient_sigma[kept], gpis.settings)
     trimmed = trimmed.optimise(max_iterations=_KERNEL_STEPS)
     peaks = 0.5 * np.log(contacts.point_weights) + 1.5 * np.log(contacts.normal_weights) - 2 * np.log(2 * np.pi)
-    left_out = float(np.sum(peaks[~kept] - _LEFT_OUT_nats))
-    likelier = trimmed.log_marginal_likelihood() + left_out > gpis.log_marginal_likelihood() + _LEFT_OUT_nats
+    left_out = float(np.sum(peaks[~kept] - LEFT_OUT_nats))
+    likelier = trimmed.log_marginal_likelihood() + left_out > gpis.log_marginal_likelihood() + LEFT_OUT_nats
     return (trimmed, left_out) if likelier else (gpis, 0.0)
 
 
@@ -255,60 +202,3 @@ def _candidates(
     if upright and "prism" not in settings.without:
         fits.append(lambda gpis: Prism.fit(gpis, best_outline, free_points_m))
     return fits
-
-
-def _try_make(maker: Callable[[], FittedShape]) -> FittedShape | None:
-    try:
-        return maker()
-    except ShapeError:  # the contacts do not allow this model; the others remain
-        return None
-
-
-def _checked_evidence(
-    shape: FittedShape,
-    gpis: Gpis,
-    free_points_m: Array | None,
-    floor_m: float | None,
-    *,
-    at_least: float,
-    largest_share_off: float = _LARGEST_SHARE_OFF,
-) -> float:
-    """The evidence of a solid, reduced for contacts that its planes explain but its surface excludes.
-
-    Minus infinity if it has no surface, excludes many contacts, or fills free places. Its surface is computed only if
-    the evidence can reach ``at_least``.
-    """
-    if shape.log_evidence is None or shape.log_evidence <= at_least:
-        return -np.inf
-    try:
-        mesh = shape.mesh(_COARSE_m, floor_m)
-    except ShapeError:  # its faces enclose nothing
-        return -np.inf
-    away_m = distances_to_mesh(gpis.contacts_m, mesh)
-    free = np.empty((0, 3)) if free_points_m is None or "contradictions" in gpis.settings.without else free_points_m
-    if np.mean(away_m > _ON_SURFACE_m) > largest_share_off or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
-        return -np.inf
-    return shape.log_evidence - stray_cost(away_m, contacts_of(gpis).point_weights)
-
-
-def stray_cost(away_m: Array, weights: Array) -> float:
-    """Cost, in nats, of contacts that a solid's planes explain but its surface excludes; at most that of an outlier
-    each.
-
-    Args:
-        away_m: distances of the contacts from the surface, shape (n,).
-        weights: inverse variances of their noise, which the planes account for, shape (n,), 1/m^2.
-    """
-    beyond = np.maximum(away_m * np.sqrt(weights) - _NOISE_SIGMAS, 0.0)
-    return float(np.minimum(0.5 * beyond**2, _LEFT_OUT_nats).sum())
-
-
-def _filled_share(mesh: SurfaceMesh, free_points_m: Array) -> float:
-    """Share of free places that lie inside a mesh by more than the contacts' noise."""
-    if len(free_points_m) == 0:
-        return 0.0
-    inside = are_inside(free_points_m, mesh)
-    if not inside.any():
-        return 0.0
-    deep = distances_to_mesh(free_points_m[inside], mesh) > _FREE_SIGMA_m
-    return float(deep.sum() / len(free_points_m))

@@ -14,6 +14,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.planar.polygon import Polygon
+from tactile_lab.slam.shape.selection.contradictions import stray_cost
 from tactile_lab.slam.shape.selection.planar_choice import (
     SharpOutline,
     best_shape,
@@ -21,7 +22,6 @@ from tactile_lab.slam.shape.selection.planar_choice import (
     polygon_of,
     sharp_outlines,
 )
-from tactile_lab.slam.shape.selection.spatial_choice import stray_cost
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon

@@ -1,0 +1,67 @@
+"""The likeliest solid of revolution: standing, lying, or with parts beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from drivers.core.contacts import Array
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.model import FittedShape
+from tactile_lab.slam.shape.selection.contradictions import checked_evidence, try_make
+from tactile_lab.slam.shape.solids.lying import Lying
+from tactile_lab.slam.shape.solids.turned import Turned
+from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
+
+_LARGEST_SHARE_OFF, _LARGEST_SHARE_OFF_WITH_PART = 0.01, 0.05
+
+
+def revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:
+    """The solid of revolution, standing or lying, with a part beside it or without, whichever has most evidence; None
+    if none has enough.
+    """
+    without = gpis.settings.without
+    if "turned" in without:
+        return None
+    body: FittedShape | None = _turned(gpis, free_points_m, floor_m, at_least=at_least)
+    most = at_least if body is None or body.log_evidence is None else body.log_evidence
+    lying = _lying(gpis, free_points_m, floor_m, at_least=most)
+    body, most = (body, most) if lying is None else (lying, lying.log_evidence)
+    if "parts" in without:
+        return body
+    return _turned_with_part(gpis, free_points_m, floor_m, at_least=most) or body
+
+
+def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Turned | None:
+    """The solid of revolution, if it has more evidence and hardly any contact is off its surface.
+
+    Its evidence is a marginal likelihood like the field's, so that no cross-validation is needed. A handle has only a
+    few contacts: the body may well be likelier without them, but then the handle would be missing.
+    """
+    shape = try_make(lambda: Turned.fit(gpis, floor_m, free_points_m))
+    if not isinstance(shape, Turned):
+        return None
+    off = _LARGEST_SHARE_OFF
+    evidence = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if evidence > at_least else None
+
+
+def _lying(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Lying | None:
+    """The solid of revolution that lies, as :func:`_turned`. What its noise explains is no stray."""
+    shape = try_make(lambda: Lying.fit(gpis, floor_m, free_points_m))
+    if not isinstance(shape, Lying):
+        return None
+    off = _LARGEST_SHARE_OFF
+    checked = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if np.isfinite(checked) else None
+
+
+def _turned_with_part(
+    gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float
+) -> FittedShape | None:
+    """The solid of revolution with a part beside it, if it has more evidence, as :func:`_turned`."""
+    shape = try_make(lambda: turned_with_parts(gpis, floor_m, free_points_m))
+    if shape is None:
+        return None
+    off = _LARGEST_SHARE_OFF_WITH_PART
+    evidence = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if evidence > at_least else None
