@@ -28,7 +28,8 @@ _LARGEST_GAP_rad = np.deg2rad(220.0)
 _NOISE_PRICE_nats = 1.0
 """Of a parameter that a solid that stands does not have (Akaike's criterion)."""
 
-_STEP_rad, _TOLERANCE_rad = np.deg2rad(5.0), np.deg2rad(0.1)
+_STEP_rad, _SEARCHED_rad, _TOLERANCE_rad = np.deg2rad([2.0, 4.0, 0.1])
+"""Of headings that are compared by misfit; how far around the best the likeliest is looked for, and how closely."""
 
 
 @dataclass(frozen=True)
@@ -80,14 +81,9 @@ def _heading_rad(contacts: WeightedContacts) -> float:
     """Of the horizontal axis that normals pass nearest by. Raises ShapeError: contacts surround none."""
     headings = np.arange(0.0, np.pi, _STEP_rad)
     misfits = [_misfit(heading, contacts) for heading in headings]
-    best = headings[int(np.argmin(misfits))]
     if not np.isfinite(min(misfits)):
         raise ShapeError("the contacts do not surround a horizontal axis")
-    limits = best - _STEP_rad, best + _STEP_rad
-    found = minimize_scalar(
-        _misfit, bounds=limits, args=(contacts,), method="bounded", options={"xatol": _TOLERANCE_rad}
-    )
-    return float(found.x if found.fun < min(misfits) else best)
+    return float(headings[int(np.argmin(misfits))])
 
 
 def _misfit(heading_rad: float, contacts: WeightedContacts) -> float:
@@ -110,8 +106,8 @@ def _likeliest_rad(contacts: WeightedContacts, heading_rad: float, rough: Turned
         half = replace(rough, axis_m=axis_m).half_of(seen, everything)
         return -half.log_marginal_likelihood() - misfit_around(seen, axis_m)[1]
 
-    limits = -float(_STEP_rad), float(_STEP_rad)
-    found = minimize_scalar(cost, bounds=limits, method="bounded", options={"xatol": _TOLERANCE_rad})
+    limits = -float(_SEARCHED_rad), float(_SEARCHED_rad)
+    found = minimize_scalar(cost, bounds=limits, method="bounded", options={"xatol": float(_TOLERANCE_rad)})
     return heading_rad + float(found.x)
 
 
