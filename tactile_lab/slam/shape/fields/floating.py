@@ -38,7 +38,8 @@ def standing(field: Gpis, floor_m: float) -> Gpis:
     """The field, told that walls go on to the table below its lowest contacts, if it hangs over it.
 
     A field closes where a hand no longer came, and an object that nobody touched in its lower third hangs in the air.
-    Places as far inside as a told place is uncertain are told, one below the other, and across the foot.
+    Walls that go on below the lowest contacts are told, at their inclination if that is outward, and what is inside the
+    foot.
 
     Args:
         field: in space or of a section, its last coordinate the height; normals are observed.
