@@ -137,10 +137,11 @@ class DecisionMaker(Protocol):
 class Performer(Protocol):
     """Executes grasps: the steps of one, in the order in which they are called. See :class:`GraspCycle`."""
 
-    landings_world_m: list[Array]
     jammed: tuple[str, ...]
     slipped: Slip | None
 
+    @property
+    def landings_world_m(self) -> list[Array]: ...
     @property
     def plan(self) -> GraspPlan: ...
     def descend(self, plan: GraspPlan) -> bool: ...

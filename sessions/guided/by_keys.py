@@ -61,7 +61,8 @@ class GraspByKeys(GraspCycle):
         else:
             prompt = "Move the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
             self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
-        self._plan, self.landings_world_m, self._above_m = plan, [], None
+        self._begin(plan)
+        self._above_m = None
         for request in self._guided.requests():
             if request.ask is Ask.GO:
                 arrived = super().descend(self.plan)
@@ -146,7 +147,7 @@ class GraspByKeys(GraspCycle):
         """Close or open fingers by steps along their paths; each stops when it touches."""
         table, progress = self.fingers.table, self.fingers.progress
         way_m = self._console.settings.finger_step_m * request.steps
-        asked = [finger for finger in request.fingers if finger in self._fingers]
+        asked = [finger for finger in request.fingers if finger in self._hand.form.fingers]
         moving = set(asked)
         cycles = self._motion.cycles(abs(way_m) / (self.settings.closing_m_s * self._motion.supervisor.speed_scale))
         for _ in range(cycles):

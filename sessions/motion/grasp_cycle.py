@@ -9,14 +9,13 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.closing import SIDES, Closing, closing
-from drivers.shadow.closing.hand_envelope import lowest_inside_m, open_hand
 from drivers.shadow.closing.posture import HandShape
+from sessions.motion.arrival import Arrival, Place
 from sessions.motion.carry_guard import CarryGuard, cycles_evenly_along
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_fingers import GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, evade
-from sessions.motion.guard import Guard
 from sessions.motion.holding import HoldingForces
 from sessions.motion.motion import Motion
 from sessions.motion.probing.side_survey import LOW_m
@@ -28,9 +27,6 @@ from sessions.perception.carrying.slip import Slip
 
 _LEAST_HOLD_N = 0.1
 """A fingertip that presses less holds nothing."""
-
-_LINKS_NEAR_m = 0.005
-"""Above a top that is known on: from there links may land on it."""
 
 _BELOW_TOP_m = 0.012
 """So far at least the fingertips' centres stay below it where a grasp is tried again higher."""
@@ -55,15 +51,11 @@ class GraspCycle:
     ) -> None:
         self._motion, self.settings = motion, settings
         self._toucher = Toucher(motion, settings, hand or HandShape())
-        self._guard = Guard(motion, settings.touch.met_N, settings.held_up_rad)
-        self._landing = Guard(motion, settings.landing_force_N, settings.held_up_rad)
+        self._arrival = Arrival(motion, settings, hand or HandShape())
         self._hand, self._yaw_window_rad = hand or HandShape(), yaw_window_rad
         self._plan: GraspPlan | None = None
         self.fingers = GraspFingers(motion, settings, self._hand)
         """Close, hold and open."""
-
-        self.landings_world_m: list[Array] = []
-        """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
 
         self.holding_N = settings.squeeze_force_N
         """Force of each finger while the object is carried; :meth:`forecast` fits it to what is known of the object."""
@@ -75,14 +67,19 @@ class GraspCycle:
         """The slip at which the last re-orientation stopped early."""
 
     @property
-    def _fingers(self) -> tuple[str, ...]:
-        return self._hand.form.fingers
-
-    @property
     def plan(self) -> GraspPlan:
         """The current grasp at its actual position (a landing or a re-orientation shifts it)."""
         assert self._plan is not None
         return self._plan
+
+    @property
+    def landings_world_m(self) -> list[Array]:
+        """Centres of the tips, (3,) each, at each landing on the object in the last approach."""
+        return self._arrival.landings_world_m
+
+    def _begin(self, plan: GraspPlan) -> None:
+        """Another grasp: nothing was landed on in its approach."""
+        self._plan, self._arrival.landings_world_m = plan, []
 
     # --- down --------------------------------------------------------------------------------------------------
 
@@ -97,7 +94,7 @@ class GraspCycle:
             Whether the hand has descended around the object, fingers open; after a touch alone, whether there was room
             for it: the hand has risen again, and only :meth:`capture` may follow.
         """
-        self._plan, self.landings_world_m = plan, []
+        self._begin(plan)
         if plan.only_touch:
             return self._touch(plan)
         if self._table().is_sideways:
@@ -107,34 +104,29 @@ class GraspCycle:
             self._toucher.tap(plan.frame)
         for _ in range(self.settings.landing_tries):
             self._move_above()
-            hit = self._come_down()
+            hit = self._arrival.come_down(self._place)
             if not hit:
                 self._motion.supervisor.on_approach()
                 return True
-            up_m = self._short_of_m()
+            up_m = self._arrival.short_of_m(self._place)
             self.lift()
             if (again := self._otherwise(plan, hit, landed, up_m)) is None:
                 return False
             self._plan = again
         return False
 
-    def _short_of_m(self) -> float:
-        """How far above the grasp the hand is."""
-        down = self._motion.base_joints(self.plan.frame, self._table())
-        return float(np.linalg.norm(down[:3] - self._motion.runtime.perception.hand.base_q[:3]))
-
     def _otherwise(self, plan: GraspPlan, hit: tuple[str, ...], landed: set[str], up_m: float) -> GraspPlan | None:
         """The plan after a landing ``up_m`` above the grasp: where only links did, which would land again a little
         aside, so much higher; otherwise as :func:`evade` says. None where that may not be.
         """
-        s = self.settings
-        if not (fingers := [finger for finger in hit if finger in self._fingers]):
-            top_m = self._motion.tallest_m or np.inf
-            return self.plan.raised(up_m, top_m - _BELOW_TOP_m)
+        if not (fingers := [finger for finger in hit if finger in self._hand.form.fingers]):
+            top_m = self._motion.tallest_m
+            return self.plan.raised(up_m, np.inf if top_m is None else top_m - _BELOW_TOP_m)
         if not plan.may_shift:
             return None
         landed.update(fingers)
-        return evade(plan, self.plan, fingers, landed, self._table(), s.landing_shift_m, self._yaw_window_rad)
+        shift_m = self.settings.landing_shift_m
+        return evade(plan, self.plan, fingers, landed, self._table(), shift_m, self._yaw_window_rad)
 
     def _touch(self, plan: GraspPlan) -> bool:
         """Only touch, and rise again."""
@@ -143,7 +135,7 @@ class GraspCycle:
             return True
         felt = self._touch_side(plan)
         if felt is None:
-            self._note_landing(self._toucher.guard)
+            self._arrival.note(self._place, self._toucher.guard)
         return felt is not None
 
     def _touch_side(self, plan: GraspPlan) -> SideTouch | None:
@@ -175,67 +167,18 @@ class GraspCycle:
 
         A contact of a fingertip on the way in is captured as a touch.
         """
-        s, motion, table = self.settings, self._motion, self._table()
         if self.plan.tap:
             self._touch_side(self.plan)
         self._move_above()
-        self._guard.restart()
-        beside = motion.base_joints(self.plan.frame, table, 0.0, self._away_m)
-        if not motion.probe_base(beside, s.beside_m_s, self._guard.is_met):
-            self._note_landing(self._guard)
-            motion.climb(self._above(), s.travel_m_s)
+        if not self._arrival.come_beside(self._place, self._away_m):
+            self._motion.climb(self._above(), self.settings.travel_m_s)
             return False
-        motion.tare(s.rest_s)
-        self._guard.restart()
-        motion.runtime.begin_closing()
-        for q in motion.line(motion.base_joints(self.plan.frame, table), s.approach_m_s):
-            motion.set_base(q)
-            motion.tick()
-            if self._guard.is_met():
-                motion.set_base(motion.runtime.perception.hand.base_q)
-                self._note_landing(self._guard)
-                self._toucher.capture()
-                self.lift()
-                return False
-        motion.supervisor.on_approach()
+        if not self._arrival.come_in(self._place):
+            self._toucher.capture()
+            self.lift()
+            return False
+        self._motion.supervisor.on_approach()
         return True
-
-    def _note_landing(self, guard: Guard) -> None:
-        """Store where the hand hit something: at the fingertip that did, or else at the foremost."""
-        fingers = [finger for finger in guard.met if finger in self._fingers] or list(self._fingers)
-        ahead = np.asarray(self.plan.frame.pose.rotation().rotate(np.array(self._table().approach)))
-        places = [self._motion.tip_centre_world_m(finger, self._hand) for finger in fingers]
-        self.landings_world_m.append(max(places, key=lambda place: float(place @ ahead)))
-
-    def _note_landing_from_above(self, guard: Guard, link_m: float) -> None:
-        """Store where the hand landed; links alone, the lowest of which is at ``link_m``, do so between the fingertips,
-        which passed by.
-        """
-        if np.isinf(link_m) or any(finger in self._fingers for finger in guard.met):
-            self._note_landing(guard)
-            return
-        frame = self.plan.frame
-        self.landings_world_m.append(np.array([frame.x_m, frame.y_m, link_m + self._short_of_m()]))
-
-    def _come_down(self) -> tuple[str, ...]:
-        """Guarded descent, slower from the object's top on, and slowest where links may land on it.
-
-        Returns:
-            What landed on something: fingers, or unidentified links.
-        """
-        s, guard, motion, table = self.settings, self._landing, self._motion, self._table()
-        hand = table.name, table.height_m, self._hand
-        inside_m = lowest_inside_m(*hand)
-        tips_m = max(0.0, motion.tallest_m + s.touch.near_m - open_hand(*hand).lowest_m)
-        links_m = np.clip(motion.tallest_m + _LINKS_NEAR_m - inside_m, 0.0, tips_m)
-        for above_m, speed_m_s in ((tips_m, s.descent_m_s), (links_m, s.landing_m_s), (0.0, s.links_landing_m_s)):
-            guard.restart()
-            if not motion.probe_base(motion.base_joints(self.plan.frame, table, above_m), speed_m_s, guard.is_met):
-                motion.wait(s.rest_s)
-                guard.is_met()
-                self._note_landing_from_above(guard, inside_m)
-                break
-        return guard.met
 
     # --- close and measure -------------------------------------------------------------------------------------
 
@@ -352,6 +295,10 @@ class GraspCycle:
     def idle(self) -> None:
         """One cycle without motion."""
         self._motion.tick()
+
+    @property
+    def _place(self) -> Place:
+        return Place.of(self.plan, self._hand)
 
     def _table(self) -> Closing:
         return closing(self.plan.closing, self.plan.height_m, self._hand)

@@ -48,8 +48,8 @@ class Motion:
         """Newest strain-gauge counts of the motors, shape (20,); None if the hand reports none."""
         self.hand_stamp_ns: int | None = None
         """When the newest status of the hand arrived, session clock; None before the first."""
-        self.tallest_m = 0.0
-        """Height over the table of whatever may stand there, as far as it is known: the hand travels above it."""
+        self.tallest_m: float | None = None
+        """Height over the table of whatever may stand there: the hand travels above it. None where it is not known."""
 
     @cached_property
     def _base_q(self) -> Array:

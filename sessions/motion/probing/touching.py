@@ -21,7 +21,7 @@ from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.guard import Guard
 from sessions.motion.motion import Motion
 from sessions.motion.probing.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m, lowest_ahead, lowest_touch_m
-from sessions.motion.travel import travel_height_m
+from sessions.motion.travel import top_at_most_m, travel_height_m
 from sessions.perception.approach_paths import TipSurface
 
 
@@ -91,8 +91,9 @@ class Toucher:
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._hand), self._motion
         self._poise(table, TAP, frame)
         touching_m = self._hand.semi_axes_m[2] - TAP_HEIGHT_m
-        lowest_m = max(s.lowest_m, motion.tallest_m - below_top_m)
-        near_m = max(lowest_m, motion.tallest_m + s.near_m)
+        top_m = top_at_most_m(motion)
+        lowest_m = s.lowest_m if motion.tallest_m is None else max(s.lowest_m, top_m - below_top_m)
+        near_m = max(lowest_m, top_m + s.near_m)
         motion.runtime.begin_closing()
         found = np.empty((0, 3))
         near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, lowest_m))
