@@ -68,7 +68,7 @@ class Arrival:
         """
         s, guard, motion = self._settings, self._landing, self._motion
         inside_m = lowest_inside_m(place.table.name, place.table.height_m, self._hand)
-        tips_m, links_m = self._slower_from_m(place.table, inside_m)
+        tips_m, links_m = np.minimum(self._slower_from_m(place.table, inside_m), self.short_of_m(place))
         for above_m, speed_m_s in ((tips_m, s.descent_m_s), (links_m, s.landing_m_s), (0.0, s.links_landing_m_s)):
             guard.restart()
             if not motion.probe_base(motion.base_joints(place.frame, place.table, above_m), speed_m_s, guard.is_met):

@@ -15,10 +15,9 @@ from sessions.motion.carry_guard import CarryGuard, cycles_evenly_along
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_fingers import GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
-from sessions.motion.grasp_plan import GraspPlan, evade
+from sessions.motion.grasp_plan import GraspPlan, TouchPlace, evade
 from sessions.motion.holding import HoldingForces
 from sessions.motion.motion import Motion
-from sessions.motion.probing.side_survey import LOW_m
 from sessions.motion.probing.touching import SideTouch, Toucher
 from sessions.motion.travel import travel_height_m
 from sessions.motion.weighing import Grip, LiftEnd, Weigher
@@ -141,8 +140,9 @@ class GraspCycle:
     def _touch_side(self, plan: GraspPlan) -> SideTouch | None:
         """Touch the side that a grasp from the side comes from."""
         side = next(side for side in SIDES if plan.closing.endswith(side))
-        low_m, beyond_m = (LOW_m, self.settings.touch.past_side_m) if plan.only_touch else (0.0, 0.0)
-        return self._toucher.touch_side(plan.frame, side, self.settings.standoff_m, plan.height_m, low_m, beyond_m)
+        beyond_m = self.settings.touch.past_side_m if plan.only_touch else 0.0
+        places = plan.places or (TouchPlace(plan.frame, plan.height_m),)
+        return self._toucher.touch_side(places, side, self.settings.standoff_m, beyond_m)
 
     def _move_above(self) -> None:
         s = self.settings

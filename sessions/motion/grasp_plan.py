@@ -17,6 +17,22 @@ ContactHeight: TypeAlias = Annotated[float, Field(ge=LOWEST_m, le=HIGHEST_m)]
 
 
 @dataclass(frozen=True)
+class TouchPlace:
+    """Where a side is touched.
+
+    Attributes:
+        frame: the grasp frame, in the world, on the side.
+        height_m: of the lowest fingertip.
+        up_to_m: fingertips up to this height are all laid against it, above it only the one that meets it: several push
+            an object over that one leaves standing.
+    """
+
+    frame: GraspFrame
+    height_m: float
+    up_to_m: float = 0.0
+
+
+@dataclass(frozen=True)
 class GraspPlan:
     """One grasp to execute.
 
@@ -27,6 +43,7 @@ class GraspPlan:
         reason: why this grasp was chosen, for people.
         tap: touch first: tap on the top, or from the side touch the side that the hand comes from.
         only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
+        places: where it touches that side, one after another.
         may_shift: where a fingertip lands the hand may try again a little aside.
         may_rise: where only a link lands it may try again higher: no outline at one height is wanted.
     """
@@ -37,6 +54,7 @@ class GraspPlan:
     reason: str = ""
     tap: bool = False
     only_touch: bool = False
+    places: tuple[TouchPlace, ...] = ()
     may_shift: bool = True
     may_rise: bool = False
 

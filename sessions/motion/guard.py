@@ -48,6 +48,11 @@ class Guard:
         self.met = tuple(dict.fromkeys((*self.met, *found)))
         return bool(self.met)
 
+    def leans(self) -> bool:
+        """Look at the last cycle after the motion, while fingertips are laid on; whether a link leans on something."""
+        self._links.take(self._motion.motor_torques, self._motion.hand_stamp_ns)
+        return self._links.is_leaning
+
     def _pushes_unfelt(self) -> bool:
         """Whether a motor whose joint stands still works against something that no tip, or not its finger's, feels."""
         pushed = set(self._fingers[self._links.pushed].tolist())

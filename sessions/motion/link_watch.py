@@ -33,6 +33,13 @@ _STILL = (3.0, 18.0, 3)
 _STILL_WRIST = (4.0, 60.0, 5)
 """The same for the motor of a joint that stands still, of the fingers and of the wrist."""
 
+_BOTH = (60.0, 2)
+"""The same for the wrist's two motors together: jerks show in one of them, 51 counts at most in both."""
+
+_MOVING = (60.0, 2)
+"""The same for the motor of a finger that moves a little, as when it is laid on something: what its tip feels is 0.7 N
+there, and shows as 45 counts at most; 1 N on a link shows as 90."""
+
 _COMPARED, _LEAST_COMPARED = 200, 5
 """Newest readings that tell what is usual, and the fewest."""
 
@@ -50,6 +57,7 @@ class LinkWatch:
     """
 
     def __init__(self, is_wrist: NDArray[np.bool_]) -> None:
+        self._is_wrist = is_wrist
         self._sigmas, self._counts, self._in_a_row = np.where(is_wrist, *np.array([_STILL_WRIST, _STILL])[..., None])
         self.restart()
 
@@ -61,8 +69,9 @@ class LinkWatch:
         self._since: list[Array] = []
         """What was heard since the newest reading."""
         self._readings: deque[Array] = deque(maxlen=_COMPARED)
-        self._far, self._off = 0, np.zeros(len(self._counts), dtype=int)
-        """Readings in a row in which any motor is far off; and for each motor, in which it is off at all."""
+        self._far, self._leaning, self._both, self._off = 0, 0, 0, np.zeros(len(self._counts), dtype=int)
+        """Readings in a row in which any motor is far off, a finger's is a little, or both of the wrist are; and for
+        each motor, in which it is off at all."""
 
     @property
     def is_touched(self) -> bool:
@@ -70,9 +79,14 @@ class LinkWatch:
         return self._far >= _READINGS
 
     @property
+    def is_leaning(self) -> bool:
+        """Whether something pushes on a link of a finger that is moved a little."""
+        return self._leaning >= _MOVING[1]
+
+    @property
     def pushed(self) -> NDArray[np.bool_]:
         """Motors that show a push if they stand still, shape (20,)."""
-        return np.asarray(self._off >= self._in_a_row)
+        return np.asarray((self._off >= self._in_a_row) | (self._is_wrist & (self._both >= _BOTH[1])))
 
     def take(self, torques: Array | None, stamp_ns: int | None) -> None:
         """Judge the newest reading.
@@ -106,5 +120,9 @@ class LinkWatch:
         off = np.abs(torques - usual)
         far = off > np.maximum(_LEAST_COUNTS, _SIGMAS * sigma)
         self._far = self._far + bool(is_new[far].any()) if far.any() else 0
+        leans = (off > np.maximum(_MOVING[0], _SIGMAS * sigma)) & ~self._is_wrist
+        self._leaning = self._leaning + bool(is_new[leans].any()) if leans.any() else 0
+        both = self._is_wrist & (off > _BOTH[0])
+        self._both = self._both + bool(is_new[both].any()) if np.count_nonzero(both) > 1 else 0
         is_off = off > np.maximum(self._counts, self._sigmas * sigma)
         self._off = np.where(is_off, self._off + is_new, 0)

@@ -11,7 +11,7 @@ from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.motion import Motion
 from sessions.motion.probing.box_prober import BoxProber
-from sessions.motion.probing.touching import Toucher
+from sessions.motion.probing.raking import Raker
 from sessions.motion.safety import InterruptGuard, SafetySettings, SafetySupervisor
 from sessions.rig_runtime.rig_runtime import RigRuntime
 from tactile_lab.autonomy.closing_tables import solve_closings
@@ -67,7 +67,7 @@ def autonomous_roles(
 
 def prober_for(motion: Motion, settings: SessionSettings, hand: HandShape) -> BoxProber:
     """Measures the bounding box of a session's object."""
-    toucher, plan = Toucher(motion, settings.cycle, hand), settings.plan
+    toucher, plan = Raker(motion, settings.cycle, hand), settings.plan
     return BoxProber(toucher, settings.probing, plan.yaw_window_rad, plan.start_m)
 
 

@@ -39,6 +39,7 @@ class Watcher(NullProgress):
 
 def settings(grasps: int = 2, **overrides: Any) -> SessionSettings:
     quick = {"landing_force_N": 0.25, "squeeze_s": 0.1, "finger_rad_s": 20.0, "travel_m_s": 1.0, "turn_rad_s": 5.0}
+    quick |= {"landing_m_s": 0.05, "links_landing_m_s": 0.05}
     plain = {"exploration": {"policy": None}, "fixed_grasps": grasps, "probing": {"top": False}}
     content = {"grasps": grasps, "cycle": quick, **plain, **overrides}
     return validate(content, SessionSettings, where="test")

@@ -33,6 +33,8 @@ def wire_rig(folder: Path, shipped: str = "sim-wire", **changes: Any) -> Path:
     content["hand"] |= {"cycle_s": 0.004}
     content["base"] |= {"lost_limit": 100} | ({"watchdog_hz": 2.0} if shipped == "sim-ur" else {})
     content["conductor"]["probing"] = {"top": False}  # 15 s of real time in every session
+    brisk = {"landing_m_s": 0.05, "links_landing_m_s": 0.05}  # 10 s of real time in every grasp: the top is not known
+    content["conductor"]["cycle"] = content["conductor"].get("cycle", {}) | brisk
     content["conductor"]["safety"] = {"tip_stale_s": 2.0, "stale_s": 5.0, "first_moves_scale": 1.0}
     path = folder / "wire.yaml"
     path.write_text(yaml.safe_dump(content | changes))

@@ -21,8 +21,8 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.probing.bounding_box import SIDES, BoundingBox
+from sessions.motion.probing.raking import Raker
 from sessions.motion.probing.side_survey import SideSurvey
-from sessions.motion.probing.touching import Toucher
 
 _ASSUMED_m = 0.030
 """Distance from the middle to a side that was not found."""
@@ -89,7 +89,7 @@ class BoxProber:
 
     def __init__(
         self,
-        toucher: Toucher,
+        toucher: Raker,
         settings: ProbingSettings,
         yaw_window_rad: tuple[float, float],
         start_m: tuple[float, float],

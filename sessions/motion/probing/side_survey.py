@@ -13,6 +13,7 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES
 from sessions.motion.grasp_frame import GraspFrame
+from sessions.motion.grasp_plan import TouchPlace
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
 from sessions.motion.probing.touching import SideTouch, Toucher
@@ -23,8 +24,8 @@ _ASSUMED_m = 0.030
 _ASKEW_m = 0.008
 """Left and right are felt again where the middle turns out to be farther from where they were felt."""
 
-LOW_m = 0.045
-"""Fingertips up to this height are laid on together."""
+_LOW_m = 0.045
+"""Fingertips up to this height are laid on together: how wide the object is, is not known yet."""
 
 _AGAIN_m = 0.05
 """So much farther out the hand comes down once more where something stood in its way."""
@@ -102,9 +103,10 @@ class SideSurvey:
         blocked = 0
         for lane_m in self._lanes_m:
             frame = GraspFrame(float(centre_m[0]), float(centre_m[1]), yaw_rad).shifted_inside(np.array([lane_m, 0.0]))
-            felt = self._toucher.touch_side(frame, side, self._search_m, all_up_to_m=LOW_m)
+            places = [TouchPlace(frame, self._toucher.lowest_m(side), _LOW_m)]
+            felt = self._toucher.touch_side(places, side, self._search_m)
             if felt is None:
-                felt = self._toucher.touch_side(frame, side, self._search_m + _AGAIN_m, all_up_to_m=LOW_m)
+                felt = self._toucher.touch_side(places, side, self._search_m + _AGAIN_m)
             if felt is not None and len(felt):
                 return felt
             blocked += felt is None

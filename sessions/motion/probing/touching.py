@@ -8,7 +8,8 @@ touch.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,9 +19,11 @@ from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.closing.tip_motion import motor_rates
 from sessions.motion.cycle_settings import CycleSettings, TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
-from sessions.motion.guard import Guard
+from sessions.motion.grasp_plan import TouchPlace
+from sessions.motion.guard import LINKS, Guard
 from sessions.motion.motion import Motion
-from sessions.motion.probing.touch_patterns import COLUMN, ROW, TAP, Pattern, TAP_HEIGHT_m, lowest_ahead, lowest_touch_m
+from sessions.motion.probing.lane import Lane
+from sessions.motion.probing.touch_patterns import COLUMN, TAP, Pattern, TAP_HEIGHT_m, lowest_ahead, lowest_touch_m
 from sessions.motion.travel import top_at_most_m, travel_height_m
 from sessions.perception.approach_paths import TipSurface
 
@@ -39,7 +42,15 @@ class SideTouch:
         return len(self.points_m)
 
 
-_DOWN, _BACK = np.array([0.0, 0.0, -1.0]), np.array([-1.0, 0.0, 0.0])
+_DOWN = np.array([0.0, 0.0, -1.0])
+_BELOW_m = 0.003
+"""Below the top as it is known: what a tap meets from there on is a rim or a slope, on which links land."""
+
+_SUNK_s = 0.2
+"""So much longer fingertips are laid on where the hand sinks meanwhile."""
+
+_AWAY_m = 0.03
+"""From a side that is known, while the hand goes along it."""
 
 
 class Toucher:
@@ -61,11 +72,6 @@ class Toucher:
         """Speeds and forces of touching."""
         return self._cycle.touch
 
-    @property
-    def first_finger_side(self) -> float:
-        """1 where the first finger is toward +y of the grasp frame, -1 on a left hand."""
-        return -1.0 if self._hand.form.is_left else 1.0
-
     def expect_tallest(self, height_m: float) -> None:
         """From here on the hand travels above this height: nothing on the table is taller, as far as is known."""
         self._motion.tallest_m = height_m
@@ -82,7 +88,8 @@ class Toucher:
 
         Args:
             frame: the fingertips are around its origin.
-            below_top_m: no farther down than this below the tallest thing that is known, and never onto the table.
+            below_top_m: no farther down than this below the tallest thing, which has been felt, and never onto the
+                table; below it, where links may land on a rim, more slowly still.
 
         Returns:
             Where fingertips touched something, shape (n, 3), world frame: their contacts, which on a rim are higher
@@ -90,71 +97,101 @@ class Toucher:
         """
         s, table, motion = self.settings, closing(TAP.closing, TAP_HEIGHT_m, self._hand), self._motion
         self._poise(table, TAP, frame)
-        touching_m = self._hand.semi_axes_m[2] - TAP_HEIGHT_m
-        top_m = top_at_most_m(motion)
-        lowest_m = s.lowest_m if motion.tallest_m is None else max(s.lowest_m, top_m - below_top_m)
-        near_m = max(lowest_m, top_m + s.near_m)
         motion.runtime.begin_closing()
         found = np.empty((0, 3))
-        near, lowest = (motion.base_joints(frame, table, m + touching_m) for m in (near_m, lowest_m))
         known = len(motion.runtime.perception.probed)
-        if self._approach(near, self._cycle.descent_m_s) or self._approach(lowest, s.tap_m_s, is_careful=True):
+        if self._come_down(table, frame, below_top_m):
             motion.supervisor.on_approach()
-            self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m)
-            found = self._landing_points(_DOWN, frame)
+            found, is_known = self._landing_points(_DOWN, frame), below_top_m < np.inf
+            if not is_known or LINKS not in self.guard.met:
+                self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m, heeds_links=is_known)
+                found = landed if len(landed := self._landing_points(_DOWN, frame)) else found
         self.capture()
         motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
         contacts = motion.runtime.perception.probed[known:]
         return np.array([contact.point_world_m for contact in contacts]) if contacts else found
 
+    def _come_down(self, table: Closing, frame: GraspFrame, below_top_m: float) -> bool:
+        """The way down of a tap, until it meets something. Returns whether it has."""
+        s, motion = self.settings, self._motion
+        touching_m, top_m = self._hand.semi_axes_m[2] - TAP_HEIGHT_m, top_at_most_m(motion)
+        lowest_m = s.lowest_m if motion.tallest_m is None else max(s.lowest_m, top_m - below_top_m)
+        below_m = top_m - _BELOW_m if below_top_m < np.inf else lowest_m
+        heights_m = [max(lowest_m, height_m) for height_m in (top_m + s.near_m, below_m, lowest_m)]
+        near, below, lowest = (motion.base_joints(frame, table, m + touching_m) for m in heights_m)
+        return (
+            self._approach(near, self._cycle.descent_m_s)
+            or self._approach(below, s.tap_m_s, is_careful=True)
+            or self._approach(lowest, self._cycle.links_landing_m_s, is_careful=True)
+        )
+
+    def lowest_m(self, side: str) -> float:
+        """How low the lowest fingertip of a touch from a side may be."""
+        return lowest_touch_m(side, self.settings.side_heights_m, self._hand)
+
     def touch_side(
         self,
-        frame: GraspFrame,
+        places: Sequence[TouchPlace],
         side: str,
         from_m: float,
-        height_m: float | None = None,
-        all_up_to_m: float = 0.0,
         beyond_m: float | None = None,
     ) -> SideTouch | None:
         """Come toward the middle of a grasp frame from its left or right, palm upright, fingers one above the other.
 
         Args:
-            frame: fingers move along its y axis, over its origin and a little beyond.
+            places: fingers move along their frames' y axes, over the origin and a little beyond; of those after the
+                first it is known where the side is, and what the hand meets on its way there ends the touch.
             side: where the palm stands, one of :data:`~drivers.shadow.closing.closing.SIDES`.
-            from_m: where the fingertips begin, counted from its origin.
-            height_m: of the lowest fingertip; as low as the side allows unless given.
-            all_up_to_m: fingertips up to this height are all laid against the side; above it only the one that met it:
-                several push an object over that one leaves standing.
-            beyond_m: how far over its origin; as the settings say unless given.
+            from_m: where the fingertips begin, counted from the origin.
+            beyond_m: how far over the origin; as the settings say unless given.
 
         Returns:
             What was touched, perhaps nothing; None where the hand could not come down.
         """
-        s, motion = self.settings, self._motion
-        height_m = height_m or lowest_touch_m(side, s.side_heights_m, self._hand)
-        table = closing(sideways(COLUMN.closing, side), height_m, self._hand)
-        lane, column = frame.shifted_inside(np.array([-s.row_m, 0.0])), lowest_ahead(table, self._hand, all_up_to_m)
-        known, past_m = len(motion.runtime.perception.probed), s.beyond_m if beyond_m is None else beyond_m
-        self._poise(table, column, lane, from_m)
-        begin, end = (motion.base_joints(lane, table, 0.0, away_m) for away_m in (from_m, -past_m))
+        s, motion, (first, *further) = self.settings, self._motion, places
+        table = closing(sideways(COLUMN.closing, side), first.height_m, self._hand)
+        column = lowest_ahead(table, self._hand, first.up_to_m)
+        lane = Lane(table, column, first, s.row_m, s.beyond_m if beyond_m is None else beyond_m)
+        known = len(motion.runtime.perception.probed)
+        self._poise(table, column, lane.frame, from_m)
         self.guard.restart()
-        if not motion.probe_base(begin, self._cycle.beside_m_s, self.guard.is_met):
-            self._rise_over(lane, table, from_m)
+        if not motion.probe_base(lane.joints(motion, from_m), self._cycle.beside_m_s, self.guard.is_met):
+            self._rise_over(lane.frame, table, from_m)
             return None
         motion.tare(self._cycle.rest_s)
-        motion.runtime.begin_closing()
-        landed = np.empty((0, 3))
-        if self._approach(end, s.side_m_s):
-            landed = self._landing_points(np.array(table.approach), lane)
-            self._lay_on(table, column, np.array(table.approach), lane, s.rake_N, 0.0, all_up_to_m)
-            self.capture()
-        motion.move_base(begin, *self._travel)
-        self._rise_over(lane, table, from_m)
+        landed = self._lay_against(lane)
+        for following in further:
+            lane = replace(lane, place=following)
+            if not self._go_along(lane):
+                break
+            landed = np.vstack([landed, self._lay_against(lane)])
+        motion.move_base(lane.joints(motion, from_m), *self._travel)
+        self._rise_over(lane.frame, table, from_m)
         if contacts := motion.runtime.perception.probed[known:]:
             points_m, normals = ([getattr(c, of) for c in contacts] for of in ("point_world_m", "normal_world"))
             return SideTouch(np.array(points_m), np.array(normals))
-        against = -np.asarray(lane.pose.rotation().rotate(np.array(table.approach)))
-        return SideTouch(landed, np.tile(against, (len(landed), 1)))
+        return SideTouch(landed, np.tile(-lane.ahead, (len(landed), 1)))
+
+    def _lay_against(self, lane: Lane) -> Array:
+        """Toward the side until it is met, and the fingertips against it: their foremost places, shape (n, 3)."""
+        motion, along = self._motion, np.array(lane.table.approach)
+        motion.runtime.begin_closing()
+        if not self._approach(lane.joints(motion, -lane.past_m), self.settings.side_m_s):
+            return np.empty((0, 3))
+        landed = self._landing_points(along, lane.frame)
+        self._lay_on(lane.table, lane.column, along, lane.frame, self.settings.rake_N, 0.0, lane.place.up_to_m)
+        self.capture()
+        return landed
+
+    def _go_along(self, lane: Lane) -> bool:
+        """Back a little, and over to another lane. Returns whether nothing was met there."""
+        motion, cycle, back = self._motion, self._cycle, self._motion.runtime.perception.hand.base_q.copy()
+        over = lane.joints(motion, _AWAY_m)
+        back[:3] -= motion.runtime.world_T_mount.rotation().unrotate(_AWAY_m * lane.ahead)
+        motion.move_base(back, *self._travel)
+        motion.blend_fingers(lane.table, lane.column.progress, cycle.finger_rad_s, lane.column.aside(lane.table))
+        self.guard.restart()
+        return motion.probe_base(over, cycle.approach_m_s, self.guard.is_met)
 
     def _rise_over(self, frame: GraspFrame, table: Closing, away_m: float) -> None:
         """Up to where the hand may travel."""
@@ -164,72 +201,6 @@ class Toucher:
     def _above_m(self, table: Closing) -> float:
         """How far above its touch the hand may travel."""
         return travel_height_m(table, self._motion, self._cycle, self._hand)
-
-    def rake(self, frame: GraspFrame, from_m: float) -> Array | None:
-        """Come toward the middle of a grasp frame from its +x side, fingers in a row, until they touch something.
-
-        Args:
-            frame: fingers move along its -x axis, over its origin and as far beyond.
-            from_m: their start, relative to its origin.
-
-        Returns:
-            Where fingertips touched something, shape (n, 3), world frame; None if they could not descend.
-        """
-        s, motion = self.settings, self._motion
-        table = closing(ROW.closing, s.rake_height_m, self._hand)
-        begin, end = (frame.shifted_inside(np.array([x - s.row_m, 0.0])) for x in (from_m, -s.beyond_m))
-        self._poise(table, ROW, begin)
-        self.guard.restart()
-        if not motion.probe_base(motion.base_joints(begin, table), self._cycle.descent_m_s, self.guard.is_met):
-            self._rise()
-            return None
-        motion.wait(self._cycle.rest_s)
-        motion.runtime.begin_closing()
-        found = np.empty((0, 3))
-        if self._approach(motion.base_joints(end, table), s.rake_m_s):
-            self._lay_on(table, ROW, _BACK, frame, s.rake_N, 0.0)
-            found = self._landing_points(_BACK, frame)
-            self.capture()
-            motion.move_base(motion.base_joints(begin, table), *self._travel)
-        self._rise()
-        return found
-
-    def close_thumb(self, frame: GraspFrame) -> Array | None:
-        """Come down around a grasp frame, the hand open, and close only the thumb.
-
-        Returns:
-            Where the thumb touched something, or landed on it on the way down, shape (n, 3), world frame; None if
-            another finger could not descend.
-        """
-        s, motion = self.settings, self._motion
-        table = closing(ROW.closing, s.rake_height_m, self._hand)
-        progress = {finger: table.path(finger).valid[0] for finger in table.fingers}
-        self._poise(table, Pattern(ROW.closing, progress), frame)
-        self.guard.restart()
-        if not motion.probe_base(motion.base_joints(frame, table), self._cycle.descent_m_s, self.guard.is_met):
-            stands = "TH" in self.guard.met
-            met_m = motion.tip_centre_world_m("TH", self._hand)
-            self._rise()
-            return met_m[None] if stands else None
-        motion.wait(self._cycle.rest_s)
-        motion.runtime.begin_closing()
-        path, found = table.path("TH"), np.empty((0, 3))
-        while progress["TH"] < path.valid[1] and self._motion.loads_N().get("TH", 0.0) <= s.met_N:
-            progress["TH"] += self._cycle.closing_m_s * motion.cycle_s / path.length_m
-            motion.set_fingers(table, progress)
-            motion.tick()
-        if self._motion.loads_N().get("TH", 0.0) > s.met_N:
-            motion.wait(self._cycle.rest_s)
-            found = self._landing_points(path.direction, frame)
-            self.capture()
-        progress["TH"] = path.valid[0]
-        motion.blend_fingers(table, progress, self._cycle.finger_rad_s)
-        self._rise()
-        return found
-
-    def _rise(self) -> None:
-        """Move straight up from the positioner's last target."""
-        self._motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
 
     def _landing_points(self, direction_grasp: Array, frame: GraspFrame) -> Array:
         """The foremost points of the fingertips that touch something, shape (n, 3), world frame."""
@@ -273,29 +244,31 @@ class Toucher:
         force_N: float,
         sink_m: float,
         up_to_m: float = np.inf,
+        *,
+        heeds_links: bool = True,
     ) -> None:
         """Every fingertip moves along a direction until it has the contact force, or has reached its limit.
 
         The hand sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction
-        itself. While a fingertip is pressed hard the hand draws back.
+        itself. While a fingertip is pressed hard the hand draws back; for good once a link leans on something, and
+        then no finger goes on. Where only finding the object matters, links are not heeded.
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._hand)
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         force_N = force_N if len(rates) > 1 else max(force_N, s.alone_N)
         gone_m = dict.fromkeys(rates, 0.0)
-        start, sunk_m, step_m = (
-            motion.runtime.perception.hand.base_q.copy(),
-            0.0,
-            2.0 * sink_m / motion.cycles(s.press_s),
-        )
+        start, sunk_m, leans = motion.runtime.perception.hand.base_q.copy(), 0.0, False
+        step_m = sink_m / motion.cycles(s.press_s)
         way = np.zeros(6)
         way[:3] = motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
-        for _ in motion.shares(s.press_s):
-            is_pressed = max(motion.loads_N().values(), default=0.0) >= s.most_N
+        for _ in motion.shares(s.press_s + (_SUNK_s if sink_m else 0.0)):
+            leans = leans or (heeds_links and self.guard.leans())
+            is_pressed = leans or max(motion.loads_N().values(), default=0.0) >= s.most_N
             sunk_m = float(np.clip(sunk_m + (-step_m if is_pressed else step_m), -sink_m, sink_m))
             motion.set_base(start + sunk_m * way)
-            for finger, load_N in ((f, load_N) for f, load_N in self._motion.loads_N().items() if f in rates):
+            yielding = {} if leans else {f: load_N for f, load_N in motion.loads_N().items() if f in rates}
+            for finger, load_N in yielding.items():
                 moved_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
                 gone_m[finger] = float(np.clip(gone_m[finger] + moved_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)

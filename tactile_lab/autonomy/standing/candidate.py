@@ -52,17 +52,19 @@ class StandingCandidate:
         touches: where each finger is expected to touch, shape (3,), world.
         score_m: what it would tell, less what it costs.
         depth_m: of a grasp from the side, behind the object's front.
+        further_m: where else contacts are expected as the hand touches on, shape (n, 3), world.
     """
 
     plan: GraspPlan
     touches: Mapping[str, Array]
     score_m: float
     depth_m: float = 0.0
+    further_m: Array = field(default_factory=lambda: np.empty((0, 3)))
 
     @property
     def touches_m(self) -> Array:
         """All expected places, shape (n, 3)."""
-        return np.array(list(self.touches.values()))
+        return np.vstack([*self.touches.values(), self.further_m])
 
 
 @dataclass

@@ -25,6 +25,12 @@ round has no sides. A hand that closes on the corner of a box pushes it away."""
 _FAR_m, _NEAR_m = 0.04, 0.010
 """What is touched farther than the first from all contacts is as new as can be; nearer than the second it is known."""
 
+_OPEN_m = (0.012, 0.025)
+"""A fingertip that comes down so far from all contacts has met nothing, and the next one so near would not either."""
+
+_SLENDER = 0.2
+"""Of its height the foot reaches from the middle. A box on a bulged bottom creeps over by a degree in every touch."""
+
 _UPWARD = 0.7
 """Least vertical part of the normal of a contact on the top."""
 
@@ -49,6 +55,8 @@ class FeltObject:
     _points_m: list[Array] = field(default_factory=list)
     _normals: list[Array] = field(default_factory=list)
     _looked_m: list[Array] = field(default_factory=list)
+    _open_m: list[Array] = field(default_factory=list)
+    _pushed: Array | None = None
     _first: BoundingBox = field(init=False)
     _moved: BoundingBox = field(init=False)
     """The first one, where it is by now."""
@@ -130,6 +138,15 @@ class FeltObject:
         """Something was looked for at these places, (3,) each, world: they are no longer new."""
         self._looked_m += places_m
 
+    def on_pushed(self, way: Array) -> None:
+        """It was touched from one side alone along a horizontal unit vector, world, shape (2,)."""
+        if self.is_slender(way):
+            self._pushed = way
+
+    def on_missed_top(self, places_m: Array) -> None:
+        """Fingertips of a tap were expected at these places, (n, 3), world: those far from all contacts met nothing."""
+        self._open_m += list(places_m[self._apart_m(places_m, self._points_m) > _OPEN_m[0]])
+
     # --- what is known -----------------------------------------------------------------------------------------
 
     @property
@@ -166,11 +183,26 @@ class FeltObject:
 
     def distances_m(self, places_m: Array) -> Array:
         """Of places (n, 3) to the nearest where a contact was, or was looked for in vain, shape (n,), at most 40 mm."""
-        looked_m = np.array([*self._points_m, *self._looked_m]).reshape(-1, 3)
-        if not len(looked_m):
-            return np.full(len(places_m), _FAR_m)
-        apart_m = np.linalg.norm(places_m[:, None] - looked_m[None], axis=-1)
-        return np.asarray(np.minimum(apart_m.min(axis=1), _FAR_m))
+        return np.minimum(self._apart_m(places_m, [*self._points_m, *self._looked_m]), _FAR_m)
+
+    @staticmethod
+    def _apart_m(places_m: Array, others_m: Sequence[Array]) -> Array:
+        """Of places (n, 3) to the nearest of others, (3,) each, shape (n,); infinite where there is none."""
+        apart_m = places_m[:, None] - np.array(others_m).reshape(1, -1, 3)
+        return np.asarray(np.linalg.norm(apart_m, axis=-1).min(axis=1, initial=np.inf))
+
+    def is_open(self, place_m: Array) -> bool:
+        """Whether a tap has met nothing near a place of the top, shape (3,), and nearer than any contact is."""
+        missed_m, met_m = (float(self._apart_m(place_m[None], some)[0]) for some in (self._open_m, self._points_m))
+        return missed_m < min(_OPEN_m[1], met_m)
+
+    def is_slender(self, way: Array) -> bool:
+        """Whether it is so tall against its foot along a horizontal unit vector, shape (2,), that little leans it."""
+        return self.standing_box.foot_along_m(way) < _SLENDER * self.standing_box.size_m[2]
+
+    def may_be_pushed(self, way: Array) -> bool:
+        """Whether a touch along ``way`` leans it no farther than the last one has; see :meth:`on_pushed`."""
+        return not self.is_slender(way) or self._pushed is None or float(way @ self._pushed) < 0
 
     def novelty_m(self, places_m: Array) -> float:
         """How new contacts at places (n, 3) would be: the sum of their distances to what is known."""

@@ -15,6 +15,7 @@ from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.probing.touch_patterns import TAP
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.rim_planner import RimPlanner
@@ -100,7 +101,12 @@ class StandingPlanner:
         self._touches += done.plan.only_touch
         touched = frozenset() if done.plan.only_touch else grasp.touching
         self.whereabouts.on_grasp(grasp, done, approach_of(done.plan, self.hand))
-        self.felt.on_looked([place for finger, place in done.touches.items() if finger not in touched])
+        looked = [place for finger, place in done.touches.items() if finger not in touched]
+        self.felt.on_looked([*looked, *done.further_m])
+        if done.plan.only_touch and done.plan.places:
+            self.felt.on_pushed(approach_of(done.plan, self.hand))
+        if done.plan.only_touch and done.plan.closing == TAP.closing:
+            self.felt.on_missed_top(done.touches_m)
 
     def on_estimate(self, is_placed: bool, points_m: Array, normals: Array, motion: Pose2) -> None:
         """Take note whether the contacts of the last grasp fit what was felt before, and where all are placed by now.

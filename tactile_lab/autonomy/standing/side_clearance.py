@@ -49,6 +49,14 @@ class StandingBox:
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         return float(abs(direction @ [c, s]) * self.size_m[0] + abs(direction @ [-s, c]) * self.size_m[1]) / 2
 
+    def foot_along_m(self, direction: Array) -> float:
+        """From its middle to the edge over which it tips if pushed along a horizontal unit vector, shape (2,): that of
+        the side which faces it, however askew.
+        """
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        is_along = abs(direction @ [c, s]) > abs(direction @ [-s, c])
+        return self.size_m[0 if is_along else 1] / 2
+
     def way_out_m(self, start_m: Array, direction: Array) -> float:
         """From a place inside, world x, y, along a horizontal unit vector until its side; shapes (2,)."""
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)

@@ -17,7 +17,7 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, LOWEST_m, closing, sideways
 from sessions.motion.grasp_frame import GraspFrame
-from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.grasp_plan import GraspPlan, TouchPlace
 from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear
 
@@ -41,9 +41,9 @@ _ROW_m = 0.07
 """Height of the row of fingertips in a touch from the side."""
 
 
-def slides(height_m: float, half_m: float) -> bool:
-    """Whether an object whose foot reaches ``half_m`` from its middle slides, rather than tips, if pushed so high."""
-    return height_m < half_m / _FRICTION
+def slides_up_to_m(foot_m: float) -> float:
+    """How high an object whose foot reaches so far from its middle may be pushed: it slides then, and does not tip."""
+    return foot_m / _FRICTION
 
 
 @dataclass
@@ -56,10 +56,10 @@ class SidePlanner(ActionPlanner):
         if not rated:
             return None
         best = max(rated, key=lambda one: one.score_m)
-        tap = self._is_near_side_new(best.plan)
+        near = self._near_side(best.plan)
         reason = f"{len(best.touches)} contacts expected at {self._spread(best.touches_m)}"
-        reason += ", its near side touched first" if tap else ""
-        return replace(best, plan=replace(best.plan, tap=tap, reason=reason))
+        reason += ", its near side touched first" if near else ""
+        return replace(best, plan=replace(best.plan, tap=near is not None, places=near or (), reason=reason))
 
     def _candidates(self) -> Iterator[StandingCandidate]:
         """The deepest clear grasp across each side of the box, from both sides of the arm, at each height."""
@@ -101,14 +101,16 @@ class SidePlanner(ActionPlanner):
             for other in self.blocked
         )
 
-    def _is_near_side_new(self, plan: GraspPlan) -> bool:
-        """Whether the side that the hand comes from is worth a touch there, and is not tipped over by it."""
+    def _near_side(self, plan: GraspPlan) -> tuple[TouchPlace] | None:
+        """A touch of the side that the hand comes from; None where it tells nothing new, or tips the object over."""
         box, way = self.felt.standing_box, approach_of(plan, self.hand)
-        half_m = box.half_along_m(way)
         heights_m = np.arange(plan.height_m, min(plan.height_m + _ROW_m, box.size_m[2]), _ROW_m / 3)
-        front = np.array([box.x_m, box.y_m]) - half_m * way
+        front = np.array([box.x_m, box.y_m]) - box.half_along_m(way) * way
         places_m = np.array([[*front, height_m] for height_m in heights_m])
-        return slides(float(heights_m.mean()), half_m) and self.felt.is_unknown(places_m)
+        steady_m = slides_up_to_m(box.foot_along_m(way))
+        if heights_m.mean() >= steady_m or not self.felt.is_unknown(places_m):
+            return None
+        return (TouchPlace(plan.frame, plan.height_m, min(steady_m, box.size_m[2])),)
 
     @staticmethod
     def _spread(touches_m: Array) -> str:

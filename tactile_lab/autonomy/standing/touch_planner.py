@@ -8,7 +8,7 @@ would rather slide than tip.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,12 +16,11 @@ from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, closing, sideways
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
-from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.probing.side_survey import LOW_m
+from sessions.motion.grasp_plan import GraspPlan, TouchPlace
 from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m, lowest_touch_m
 from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
-from tactile_lab.autonomy.standing.side_planner import slides
+from tactile_lab.autonomy.standing.side_planner import slides_up_to_m
 
 _TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.04, 0.025, 0.025
 _INSIDE_m = 0.008
@@ -32,6 +31,16 @@ _ASKEW_rad = np.radians(20.0)
 
 _SQUARELY = 0.7
 """Of the half width of what is round: farther aside a finger passes beside it, and a link meets it."""
+
+_PLACES, _STEP_m, _LEAST_NEWS_m = 3, 0.09, 0.015
+"""One coming of the hand touches a side at so many places, each no farther from the last, and with its contacts
+so far from those that are known on average."""
+
+_CLOSINGS_REACH_m = 0.05
+"""So far from the ends of a side fingers that close across it get."""
+
+_HIGHEST = 0.8
+"""Of its height an object that does not slide is pushed at."""
 
 _FINGERS_APART_m = 0.023
 """In a hand whose palm is upright."""
@@ -50,8 +59,10 @@ class TouchPlanner(ActionPlanner):
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
         new = (one for one in (*self._taps(), *self._sides()) if self.felt.is_new(one.touches_m))
-        rated = [one for one in new if not self._was_blocked(one.plan) and self.reach.holds(one.plan, self.hand)]
-        return max(rated, key=lambda one: one.score_m, default=None)
+        return max((one for one in new if self._is_open(one)), key=lambda one: one.score_m, default=None)
+
+    def _is_open(self, one: StandingCandidate) -> bool:
+        return not self._was_blocked(one.plan) and self.reach.holds(one.plan, self.hand)
 
     def _was_blocked(self, plan: GraspPlan) -> bool:
         """Whether the hand met something on its way to nearly the same touch."""
@@ -87,7 +98,7 @@ class TouchPlanner(ActionPlanner):
         for finger in table.fingers:
             place = np.asarray(frame.pose.transformFrom(table.path(finger).centre_m(TAP.progress[finger])))
             place[2] = box.size_m[2]
-            if shrunk.distances_m(place) <= 1e-9:
+            if shrunk.distances_m(place) <= 1e-9 and not self.felt.is_open(place):
                 found[finger] = place
         return found
 
@@ -98,30 +109,91 @@ class TouchPlanner(ActionPlanner):
         for yaw_rad in self.felt.yaws(self.yaw_window_rad, _ASKEW_rad):
             for side in SIDES:
                 lowest_m = lowest_touch_m(side, self.settings.side_heights_m, self.hand)
-                yield from self._on_side(yaw_rad, sideways(COLUMN.closing, side), lowest_m)
+                places = self._on_side(yaw_rad, sideways(COLUMN.closing, side), lowest_m)
+                yield from self._going_on([one for one in places if self._is_open(one)])
 
     def _on_side(self, yaw_rad: float, name: str, lowest_m: float) -> Iterator[StandingCandidate]:
         box, across = self.felt.standing_box, np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.hand)
-        half_m, wide_m = box.half_along_m(way), box.half_along_m(across)
+        if not self.felt.may_be_pushed(way):
+            return
+        foot_m, wide_m = box.foot_along_m(way), box.half_along_m(across)
+        up_to_m = min(slides_up_to_m(foot_m), box.size_m[2] - _INSIDE_m)
+        low_m, laid_m = (lowest_m + 1e-9, 0.0) if self.felt.is_slender(way) else (np.inf, up_to_m)
         for lane_m in _places(_SQUARELY * wide_m if self.felt.is_round else wide_m, _LANES_APART_m):
             lane = np.array([box.x_m, box.y_m]) + lane_m * across
             if box.distances_m(np.array([*lane, box.size_m[2] / 2])) > -_INSIDE_m:
                 continue
             front = lane - box.way_out_m(lane, -way) * way
-            frame = GraspFrame(float(front[0]), float(front[1]), yaw_rad)
+            is_beyond = wide_m - abs(lane_m) > _CLOSINGS_REACH_m
             for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m):
-                touches = _touched(front, float(height_m), box.size_m[2], self.hand.form.long_fingers)
-                if slides(max(float(place[2]) for place in touches.values()), half_m):
-                    yield self._candidate(frame, name, float(height_m), touches, "one side touched")
+                if height_m < min(up_to_m, low_m) or (is_beyond and self._hardly_leans(float(height_m), foot_m)):
+                    place = TouchPlace(GraspFrame(float(front[0]), float(front[1]), yaw_rad), float(height_m), laid_m)
+                    yield self._at(place, name)
+
+    def _at(self, place: TouchPlace, name: str) -> StandingCandidate:
+        """A touch at a place on a side by a closing of that name."""
+        front_m = np.array([place.frame.x_m, place.frame.y_m])
+        touches = _touched(front_m, place.height_m, place.up_to_m, self.hand.form.long_fingers)
+        one = self._candidate(place.frame, name, place.height_m, touches, "one side touched")
+        return replace(one, plan=replace(one.plan, places=(place,)))
+
+    def _hardly_leans(self, height_m: float, foot_m: float) -> bool:
+        """Whether what gives way so high, as far as the hand goes, leans by less than half of what it falls at.
+
+        Near its top it would lean before a fingertip feels it.
+        """
+        lean_m, top_m = self.settings.past_side_m, self.felt.standing_box.size_m[2]
+        return not self.felt.is_round and lean_m * top_m / foot_m < height_m < _HIGHEST * top_m
+
+    def _going_on(self, places: Sequence[StandingCandidate]) -> Iterator[StandingCandidate]:
+        """Each of them, followed by those that tell most beside it; they all come to the same side."""
+        for count in {len(one.touches) for one in places}:
+            alike = [one for one in places if len(one.touches) == count]
+            where_m = np.array([list(one.touches.values()) for one in alike])
+            known_m = self.felt.distances_m(where_m.reshape(-1, 3)).reshape(where_m.shape[:2])
+            for index in range(len(alike)):
+                rows, gains_m = _tour(index, where_m, known_m)
+                yield _together([alike[row] for row in rows], float(sum(gains_m)))
 
 
-def _touched(front_m: Array, height_m: float, top_m: float, fingers: Sequence[str]) -> dict[str, Array]:
-    """Where fingertips one above the other meet a side: all that are low; else the lowest, which is ahead."""
+def _tour(first: int, where_m: Array, known_m: Array) -> tuple[list[int], list[float]]:
+    """Places after the first one, and what each adds: which are near, and most news beside those before.
+
+    Args:
+        first: its row.
+        where_m: of contacts, shape (places, contacts, 3).
+        known_m: from each to the nearest that is known, shape (places, contacts).
+    """
+    rows, gains_m, left_m = [first], [float(known_m[first].sum())], known_m
+    steps_m = np.linalg.norm(where_m[:, None, 0] - where_m[None, :, 0], axis=-1)
+    while len(rows) < _PLACES:
+        apart_m = np.linalg.norm(where_m[:, :, None] - where_m[rows[-1]][None, None], axis=-1).min(axis=-1)
+        left_m = np.minimum(left_m, apart_m)
+        news_m = np.where(steps_m[rows[-1]] < _STEP_m, left_m.sum(axis=1), 0.0)
+        if news_m.max() < _LEAST_NEWS_m * where_m.shape[1]:
+            break
+        rows.append(int(np.argmax(news_m)))
+        gains_m.append(float(news_m.max()))
+    return rows, gains_m
+
+
+def _together(places: Sequence[StandingCandidate], score_m: float) -> StandingCandidate:
+    """One touch at all of these places."""
+    first, *others = places
+    if not others:
+        return first
+    further_m = np.vstack([one.touches_m for one in others])
+    count = len(first.touches) + len(further_m)
+    reason = f"one side touched at {len(places)} places: {count} contacts expected"
+    plan = replace(first.plan, places=tuple(place for one in places for place in one.plan.places), reason=reason)
+    return replace(first, plan=plan, score_m=score_m, further_m=further_m)
+
+
+def _touched(front_m: Array, height_m: float, up_to_m: float, fingers: Sequence[str]) -> dict[str, Array]:
+    """Where fingertips one above the other meet a side: all up to a height; else the lowest, which is ahead."""
     heights_m = height_m + _FINGERS_APART_m * np.arange(len(fingers))
-    met_m = heights_m[heights_m < min(LOW_m, top_m)]
-    if not len(met_m):
-        met_m = heights_m[:1]
+    met_m = heights_m[: max(1, int(np.sum(heights_m < up_to_m)))]
     return {finger: np.array([*front_m, z]) for finger, z in zip(fingers, met_m, strict=False)}
 
 

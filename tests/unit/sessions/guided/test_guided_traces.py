@@ -31,6 +31,7 @@ from tests.support.motion_trace import TracedWorld
 from tests.support.session_fakes import make_perception
 
 BRISK = {"squeeze_s": 0.2, "finger_rad_s": 6.0, "travel_m_s": 0.6, "turn_rad_s": 4.0, "lift_m": 0.05}
+BRISK |= {"landing_m_s": 0.05, "links_landing_m_s": 0.05}
 
 
 def at(stage: Stage, *requests: Request, grasp: int | None = None) -> Cue:

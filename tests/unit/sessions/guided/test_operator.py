@@ -24,6 +24,7 @@ from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 from tests.support.disc_world import Disc, DiscWorld
 
 QUICK = {"squeeze_s": 0.1, "finger_rad_s": 20.0, "travel_m_s": 1.0, "turn_rad_s": 5.0}
+QUICK |= {"landing_m_s": 0.05, "links_landing_m_s": 0.05}
 
 
 def settings(grasps: int, **guided: Any) -> SessionSettings:

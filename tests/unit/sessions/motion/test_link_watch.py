@@ -129,3 +129,37 @@ def test_a_hand_that_answers_500_times_a_second_tells_pushes_and_nothing_of_its_
 def test_a_hand_without_strain_gauges_tells_nothing() -> None:
     watch = LinkWatch(WRIST)
     assert not any(is_touched(watch, None, stamp * CYCLE_ns) for stamp in range(50))
+
+
+def first_told(pushes: dict[int, float], wrist: np.ndarray, begins: int = 200, lasts: int = 100) -> int | None:
+    """The cycle in which a push is told first, given in counts by motor; the first reading with it is number 0."""
+    rng, watch = np.random.default_rng(0), LinkWatch(wrist)
+    for cycle in range(begins + lasts):
+        torques = 300.0 + 3.0 * rng.standard_normal(20)
+        if cycle >= begins:
+            torques[list(pushes)] += list(pushes.values())
+        watch.take(torques, cycle * CYCLE_ns)
+        if watch.pushed.any():
+            return cycle - begins
+    return None
+
+
+def test_both_motors_of_the_wrist_tell_together_what_one_tells_later() -> None:
+    wrist = np.isin(np.arange(20), (8, 9))
+    assert first_told({8: -80.0, 9: 80.0}, wrist) == 1
+    assert first_told({8: -80.0}, wrist) == 4
+    assert first_told({8: -80.0, 9: 80.0}, wrist, lasts=1) is None
+
+
+def test_a_hand_without_a_wrist_tells_no_push_where_there_is_none() -> None:
+    assert first_told({}, np.zeros(20, dtype=bool)) is None
+
+
+def test_a_finger_that_is_laid_on_and_leans_on_a_link_is_told_in_two_readings() -> None:
+    for count, leans in ((45.0, False), (90.0, True)):
+        rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
+        for cycle in range(102):
+            torques = 300.0 + 3.0 * rng.standard_normal(20)
+            torques[3] += count if cycle >= 100 else 0.0
+            watch.take(torques, cycle * CYCLE_ns)
+        assert watch.is_leaning is leans

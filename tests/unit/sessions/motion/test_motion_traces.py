@@ -14,7 +14,7 @@ from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.box_prober import BoxProber, ProbingSettings
-from sessions.motion.probing.touching import Toucher
+from sessions.motion.probing.raking import Raker
 from tests.support.baseline import assert_baseline
 from tests.support.disc_world import Disc
 from tests.support.motion_trace import TIP, TracedWorld, grasp_cycle
@@ -118,7 +118,7 @@ def test_a_bounding_box(name: str) -> None:
     world = TracedWorld(disc)
     _, motion = grasp_cycle(world, BRISK)
     motion.supervisor.on_approach()
-    box = BoxProber(Toucher(motion, BRISK, TIP), settings, WINDOW_rad, (0.002, 0.001)).feel()
+    box = BoxProber(Raker(motion, BRISK, TIP), settings, WINDOW_rad, (0.002, 0.001)).feel()
     axes = box.world_T_box
     told = {
         "box": [axes.x(), axes.y(), axes.theta(), box.low_m, box.high_m, box.margin_m, box.top_m, box.has_sides],

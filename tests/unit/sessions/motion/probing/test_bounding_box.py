@@ -15,7 +15,7 @@ from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.motion import Motion
 from sessions.motion.probing.bounding_box import SIDES, BoundingBox
 from sessions.motion.probing.box_prober import BoxProber, ProbingSettings
-from sessions.motion.probing.touching import Toucher
+from sessions.motion.probing.raking import Raker
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
@@ -35,7 +35,7 @@ WINDOW_rad = (-1.31, 1.31)
 def prober(world: DiscWorld, settings: ProbingSettings = ONE_LANE) -> BoxProber:
     supervisor = SafetySupervisor(world, SafetySettings(), world.cycle_ns)
     supervisor.on_approach()
-    toucher = Toucher(Motion(world, supervisor), QUICK, TIP)  # type: ignore[arg-type]
+    toucher = Raker(Motion(world, supervisor), QUICK, TIP)  # type: ignore[arg-type]
     return BoxProber(toucher, settings, WINDOW_rad, (0.0, 0.0))
 
 

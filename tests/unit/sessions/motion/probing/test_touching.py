@@ -13,7 +13,7 @@ from drivers.shadow.model.kinematics import joint_vector, palm_T_distal_matrices
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.grasp_frame import GraspFrame
-from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.grasp_plan import GraspPlan, TouchPlace
 from sessions.motion.motion import Motion
 from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m, lowest_ahead
 from sessions.motion.probing.touching import Toucher
@@ -147,6 +147,62 @@ def test_a_hand_that_waited_for_a_pressed_finger_goes_on_from_there(monkeypatch:
     usual_m = 2 * 0.004 / motion.cycles(QUICK.touch.press_s)
     assert steps_m.max() < 1.01 * usual_m
     assert abs(heights[-1] - start) > 0.003
+
+
+def test_one_coming_touches_a_side_at_several_places_and_draws_back_between_them() -> None:
+    felt: list[bool] = []
+
+    def listen(world: DiscWorld) -> None:
+        if world.session_events:
+            felt.append(max(world.load_N(finger) for finger in FINGERS) > 0.05)
+
+    world = DiscWorld(disc(0.15), before_cycle=listen)
+    motion = motion_on(world)
+    motion.tallest_m = 0.15
+    frame = GraspFrame(0.0, 0.05, 0.0)
+    places = [TouchPlace(frame.shifted_inside(np.array([x_m, 0.0])), z_m) for x_m, z_m in ((0, 0.05), (0.02, 0.1))]
+    touch = Toucher(motion, QUICK, TIP).touch_side(places, "left", 0.1, 0.02)
+    assert touch is not None
+    np.testing.assert_allclose(np.linalg.norm(touch.points_m[:, :2], axis=1), 0.05, atol=1e-3)
+    np.testing.assert_allclose(touch.points_m[:, 2], [0.05, 0.1], atol=2e-3)
+    assert np.diff(touch.points_m[:, 0]) == pytest.approx(0.02, abs=5e-3)
+    assert np.count_nonzero(np.diff(np.array(felt).astype(int)) == 1) == 2
+    assert world.session_events.count(EventKind.TOUCH_END) == 2
+    assert world.base_q[2] > motion.base_joints(frame, closing("pinch-from-left", 0.15, TIP))[2]
+
+
+@pytest.mark.parametrize("met", [("links",), ("FF",)])
+def test_where_a_link_stands_on_the_object_no_fingertip_is_laid_on(
+    met: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    toucher, laid_on = Toucher(motion_on(DiscWorld(disc())), QUICK, TIP), []
+    monkeypatch.setattr(toucher.guard, "is_met", lambda: True)
+    monkeypatch.setattr(toucher.guard, "restart", lambda: None)
+    monkeypatch.setattr(toucher.guard, "met", met)
+    monkeypatch.setattr(toucher, "_lay_on", lambda *_, heeds_links: laid_on.append(heeds_links))
+    toucher.tap(GraspFrame(0.0, 0.0, 0.0), below_top_m=0.03)
+    assert laid_on == ([True] if met == ("FF",) else [])
+    toucher.tap(GraspFrame(0.0, 0.0, 0.0))
+    assert laid_on[-1] is False
+
+
+def test_a_tap_tells_what_it_met_even_where_the_hand_has_drawn_back_since(monkeypatch: pytest.MonkeyPatch) -> None:
+    toucher = Toucher(motion_on(DiscWorld(disc(0.05))), QUICK, TIP)
+    monkeypatch.setattr(toucher, "_lay_on", lambda *_, heeds_links: toucher._motion.rise(0.05, 1.0))
+    felt = toucher.tap(GraspFrame(0.0, 0.0, 0.0))
+    assert len(felt) >= 1
+    np.testing.assert_allclose(felt[:, 2], 0.05, atol=3e-3)
+
+
+def test_the_hand_draws_back_for_good_where_a_link_leans_on_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = DiscWorld(None)
+    motion = motion_on(world)
+    toucher, leans = Toucher(motion, QUICK, TIP), iter([False] * 20 + [True] + [False] * 1000)
+    monkeypatch.setattr(toucher.guard, "leans", lambda: next(leans))
+    start_m = float(world.base_q[2])
+    table, frame = closing(TAP.closing, TAP_HEIGHT_m, TIP), GraspFrame(0.0, 0.0, 0.0)
+    toucher._lay_on(table, TAP, np.array([0.0, 0.0, -1.0]), frame, 0.35, 0.004)
+    assert world.base_q[2] > start_m + 0.002
 
 
 def test_contacts_probed_before_the_object_was_carried_are_forgotten() -> None:

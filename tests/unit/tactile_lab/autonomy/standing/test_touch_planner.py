@@ -14,7 +14,7 @@ from drivers.shadow.model.motors import DRIVEN_JOINTS
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.safety import SafetySettings
-from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
+from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
@@ -24,6 +24,7 @@ LEFT = HandForm("left", DRIVEN_JOINTS)
 LITE = HandForm("right", tuple(name for name in DRIVEN_JOINTS if name[:2] not in ("LF", "WR")))
 """Three fingers and a thumb, on an arm in place of a wrist."""
 WINDOW_rad = (-1.31, 1.31)
+PINCH = "a pinch over the rim, the thumb inside"
 
 
 def felt(length_m: float = 0.21, width_m: float = 0.16, top_m: float = 0.07) -> FeltObject:
@@ -84,6 +85,70 @@ def test_a_narrow_tall_object_is_touched_low_only() -> None:
     assert max(place[2] for one in sides for place in one.touches_m) < 0.04 + 1e-9
 
 
+def sides(known: FeltObject, hand: HandShape = TIP) -> list[StandingCandidate]:
+    """All touches from the side, one after another."""
+    done = carry_out(TouchPlanner(known, hand, WINDOW_rad, SideReach()))
+    return [one for one in done if closing(one.plan.closing, one.plan.height_m, hand).is_sideways]
+
+
+def test_one_coming_touches_a_side_at_several_places_that_are_all_new() -> None:
+    first = sides(felt())[0]
+    assert len(first.plan.places) == 3
+    assert first.plan.places[0].frame == first.plan.frame
+    assert len({place.frame.yaw_rad for place in first.plan.places}) == 1
+    apart_m = np.linalg.norm(first.touches_m[:, None] - first.touches_m[None], axis=-1)
+    assert apart_m[apart_m > 0].min() > 0.015
+    assert len(first.touches_m) == sum(3 if place.height_m < 0.02 else 2 for place in first.plan.places)
+
+
+def test_the_middle_of_a_wide_tall_side_is_touched_high_up_where_no_closing_gets_and_the_box_hardly_leans() -> None:
+    known = felt(0.16, 0.06, 0.21)
+    places = [place for one in sides(known) for place in one.plan.places]
+    own = np.array(
+        [known.box.world_T_box.transformTo(np.array([place.frame.x_m, place.frame.y_m])) for place in places]
+    )
+    heights_m = np.array([place.height_m for place in places])
+    on_broad = np.abs(np.abs(own[:, 1]) - 0.03) < 1e-6
+    high = on_broad & (heights_m > 0.06)
+    assert np.count_nonzero(high) > 6
+    assert np.abs(own[high, 0]).max() < 0.03
+    assert heights_m[high].min() > TouchSettings().past_side_m * 0.21 / 0.03
+    assert 0.12 < heights_m[high].max() < 0.8 * 0.21
+
+
+def test_fingers_are_laid_on_together_as_high_as_a_wide_object_slides() -> None:
+    low, tall = sides(felt(0.09, 0.09, 0.16)), sides(felt(0.04, 0.04, 0.16))
+    assert {len(one.touches) for one in low} == {3, 4}
+    assert {len(one.touches) for one in tall} <= {1}
+
+
+def test_where_a_tap_met_nothing_the_top_is_open_and_no_fingertip_is_expected_there() -> None:
+    known = felt(0.16, 0.16, 0.05)
+    met, missed = np.array([[0.06, 0.0, 0.05]]), np.array([[0.01, 0.0, 0.05]])
+    known.add(met, np.array([[0.0, 0.0, 1.0]]))
+    known.on_missed_top(np.vstack([met + 0.005, missed]))
+    assert known.is_open(np.array([0.02, 0.0, 0.05]))
+    assert not any(known.is_open(np.array([x_m, 0.0, 0.05])) for x_m in (0.045, 0.06, -0.03))
+    on_top = [one for one in planner(known)._taps() if one.touches]
+    apart_m = np.linalg.norm(np.vstack([one.touches_m for one in on_top]) - missed, axis=1)
+    assert on_top
+    assert apart_m.min() > 0.020
+
+
+def test_what_is_slender_is_touched_as_low_as_can_be_by_one_finger_and_not_twice_from_the_same_side() -> None:
+    known = felt(0.098, 0.045, 0.177)
+    broad = np.array([np.cos(0.2 + np.pi / 2), np.sin(0.2 + np.pi / 2)])
+    assert known.is_slender(broad)
+    assert not known.is_slender(np.array([np.cos(0.2), np.sin(0.2)]))
+    low = [one for one in sides(known) if abs(broad @ approach_of(one.plan, TIP)) > 0.9]
+    assert {len(one.touches) for one in low} == {1}
+    assert {place.height_m for one in low for place in one.plan.places} <= {0.020, 0.032}
+    known.on_pushed(broad)
+    assert not known.may_be_pushed(broad)
+    assert known.may_be_pushed(-broad)
+    assert all(broad @ approach_of(one.plan, TIP) < 0.1 for one in sides(known))
+
+
 def test_a_blocked_touch_is_not_tried_again() -> None:
     touches = planner(felt())
     first = touches.best()
@@ -96,18 +161,20 @@ def test_a_blocked_touch_is_not_tried_again() -> None:
 
 def test_what_cannot_be_grasped_is_touched_and_then_ends_in_words() -> None:
     standing = StandingPlanner(felt(), TIP, WINDOW_rad, SideReach(), TouchSettings())
-    pinch = standing.plan()
-    assert pinch is not None
-    assert pinch.reason == "a pinch over the rim, the thumb inside"
-    standing.on_blocked()
     plan = standing.plan()
     assert plan is not None
     assert plan.only_touch
     assert "contacts expected" in plan.reason
     standing.on_blocked()
+    reasons = []
     while (plan := standing.plan()) is not None and standing.felt.grasps < 80:
-        standing.on_grasp(contacts(np.empty((0, 3)), (0, 0, 1)))
+        reasons.append(plan.reason)
+        if plan.only_touch or len([one for one in reasons if one == PINCH]) > 1:
+            standing.on_grasp(contacts(np.empty((0, 3)), (0, 0, 1)))
+        else:
+            standing.on_blocked()
     assert plan is None
+    assert PINCH in reasons
     assert standing.exhausted.startswith("nothing left that the hand can reach: 0 grasps, ")
     assert "touches, 2 approaches were blocked; the object is 160 x 210 mm wide and 70 mm high" in standing.exhausted
 
