@@ -122,6 +122,14 @@ class Grasp:
         return frozenset(contact.finger for contact in self.contacts if not contact.probed)
 
     @property
+    def has_closed(self) -> bool:
+        """Whether fingers closed, as far as is known; in a touch without a grasp no two come from opposite sides."""
+        if self.touching or not self.approach_paths:
+            return True
+        ways = np.array([path.end_world_m - path.start_world_m for path in self.approach_paths])
+        return bool((ways @ ways.T).min() < 0)
+
+    @property
     def points_world_m(self) -> Array:
         """Contact points, shape (n, 3), world frame, metres."""
         return np.array([contact.point_world_m for contact in self.contacts]).reshape(-1, 3)

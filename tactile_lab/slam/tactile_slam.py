@@ -18,7 +18,7 @@ Where an object has fallen over (:attr:`~drivers.core.contacts.Grasp.begins_anew
 object frame; grasps before that have no pose.
 
 A session is lost when the last ``lost_after`` grasps are untracked, or more than half of all. A grasp that was
-untracked when it was taken and has a place by now does not count.
+untracked when it was taken and has a place by now does not count, nor does a touch without a grasp that met nothing.
 """
 
 from __future__ import annotations
@@ -131,6 +131,7 @@ class TactileSlam:
         self._heights_m: Array = np.empty(0)
         """Of the contacts of an outline so far, over the table."""
 
+        self._empty_touches: list[bool] = []
         self._shape = CurrentShape(self._settings, self._settings.shape_model)
         self._has_ended = False
 
@@ -299,7 +300,7 @@ class TactileSlam:
     @property
     def is_lost(self) -> bool:
         """See the module's docstring; a session without an object frame is lost as well."""
-        refused = self._refused
+        refused = [each for each, empty in zip(self._refused, self._empty_touches, strict=True) if not empty]
         recent = refused[-self._settings.lost_after :]
         all_recent = len(recent) == self._settings.lost_after and all(recent)
         return self._tracker is None or all_recent or 2 * sum(refused) > len(refused)
@@ -364,6 +365,7 @@ class TactileSlam:
             seconds=time.perf_counter() - started,
         )
         self._steps.append(step)
+        self._empty_touches.append(not (grasp.contacts or grasp.has_closed))
         return step
 
     def _placed_grasps(self) -> list[PlacedGrasp | None]:

@@ -10,7 +10,7 @@ from gtsam import Pose2, Pose3, Rot3
 from pydantic import ValidationError
 from threadpoolctl import threadpool_limits
 
-from drivers.core.contacts import Grasp
+from drivers.core.contacts import ApproachPath, Grasp
 from drivers.core.poses import palm_heading, spatial
 from tactile_lab.experiments.data import spatial_data
 from tactile_lab.experiments.data.carried_off import carried_off
@@ -171,6 +171,17 @@ def test_a_grasp_that_finds_its_place_at_the_end_is_not_lost() -> None:
     assert slam.add_grasp(carried.grasps[6]).verdict == "untracked"
     assert slam.is_lost
     assert slam.finish().status != "lost"
+
+
+@pytest.mark.parametrize(("ends_m", "lost"), [((0.05, 0.05), False), ((0.05, -0.05), True)], ids=["touch", "closing"])
+def test_touches_that_meet_nothing_do_not_lose_the_object_as_closings_do(ends_m: tuple[float, ...], lost: bool) -> None:
+    slam = TactileSlam(settings(lost_after=2))
+    slam.add_grasp(FOUR.grasps[0])
+    ends = [np.array([end_m, 0.0, 0.02]) for end_m in ends_m]
+    paths = tuple(ApproachPath(f, np.array([0.0, 0.0, 0.02]), end, False) for f, end in zip("FM", ends, strict=True))
+    for grasp in FOUR.grasps[1:3]:
+        slam.add_grasp(replace(with_contacts(grasp, 0), approach_paths=paths))
+    assert slam.is_lost is lost
 
 
 def test_a_session_without_any_contact_is_lost_but_finishes() -> None:
