@@ -40,7 +40,6 @@ from tactile_lab.slam.current_shape import CurrentShape
 from tactile_lab.slam.doubt.assessment import Assessment, assess
 from tactile_lab.slam.doubt.heights import side_heights_m
 from tactile_lab.slam.doubt.rivals import displaced
-from tactile_lab.slam.doubt.spread import spread_by
 from tactile_lab.slam.doubt.status import Alternative
 from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
 from tactile_lab.slam.graph.relocation import relocated_poses
@@ -62,6 +61,7 @@ from tactile_lab.slam.tracking.trackers import (
     checked_known_poses,
     make_tracker,
 )
+from tactile_lab.slam.trajectory import Trajectory
 
 _STAYS = 1e-9
 
@@ -132,6 +132,8 @@ class TactileSlam:
         """Of the contacts of an outline so far, over the table."""
 
         self._empty_touches: list[bool] = []
+        """Of each grasp, whether it was a touch alone that met nothing."""
+
         self._shape = CurrentShape(self._settings, self._settings.shape_model)
         self._has_ended = False
 
@@ -188,12 +190,13 @@ class TactileSlam:
         wanted = self._settings
         shape = self.shape(wanted.contour_resolution_m if wanted.dimension == 2 else wanted.mesh_resolution_m)
         told = self._assess(shape)
-        covariances, common = self._covariances_with(told.alternatives)
+        trajectory = self._trajectory
+        covariances, common = trajectory.covariances_with(told.alternatives)
         return SlamResult(
             method=self._settings.method,
             seed=self._seed,
             dimension=self._settings.dimension,
-            world_T_object=self._trajectory(),
+            world_T_object=trajectory.poses,
             covariances=covariances,
             steps=tuple(self._steps),
             loops=self._back_end.reports,
@@ -211,17 +214,17 @@ class TactileSlam:
     @property
     def world_T_object(self) -> Pose3 | None:
         """The present pose; None before the object frame is defined."""
-        return self._trajectory()[-1] if self._steps else None
+        return self._trajectory.poses[-1] if self._steps else None
 
     @property
     def trajectory(self) -> tuple[Pose3 | None, ...]:
         """The present estimate of the pose at every grasp; None if unknown."""
-        return self._trajectory()
+        return self._trajectory.poses
 
     @property
     def pose_covariance(self) -> Array | None:
         """Covariance of the present (x m, y m, yaw rad) in the world, shape (3, 3)."""
-        return self._covariances()[-1] if self._steps else None
+        return self._trajectory.covariances[-1] if self._steps else None
 
     @property
     def origin_height_m(self) -> float:
@@ -237,6 +240,10 @@ class TactileSlam:
         """
         contacts = self._shape_contacts()
         return None if contacts is None else contacts.fit()
+
+    @property
+    def _trajectory(self) -> Trajectory:
+        return Trajectory(self._tracker, len(self._steps), self._origin_height_m)
 
     def _shape_contacts(self) -> ContactMap | None:
         if self._tracker is None:
@@ -367,39 +374,3 @@ class TactileSlam:
         self._steps.append(step)
         self._empty_touches.append(not (grasp.contacts or grasp.has_closed))
         return step
-
-    def _placed_grasps(self) -> list[PlacedGrasp | None]:
-        """One entry per grasp; None before the object frame was defined."""
-        placed = list(self._tracker.refined.placed) if self._tracker else []
-        return [None] * (len(self._steps) - len(placed)) + placed
-
-    def _trajectory(self) -> tuple[Pose3 | None, ...]:
-        return tuple(
-            self._space.pose(grasp.pose, self._origin_height_m) if grasp else None for grasp in self._placed_grasps()
-        )
-
-    def _covariances_with(self, others: Sequence[Alternative]) -> tuple[tuple[Array | None, ...], ...]:
-        """Covariances of the poses, and in the best common object frame, with what alternatives add."""
-        stated = self._covariances(), self._common_covariances()
-        if not others or self._tracker is None:
-            return stated
-        spread = spread_by(others, self._tracker.refined)
-        return tuple(_sums(given, added) for given, added in zip(stated, (spread.birth, spread.common), strict=True))
-
-    def _common_covariances(self) -> tuple[Array | None, ...]:
-        if not isinstance(self._tracker, JointTracker):
-            return ()
-        found = self._tracker.common_covariances
-        return (*[None] * (len(self._steps) - len(found)), *found)
-
-    def _covariances(self) -> tuple[Array | None, ...]:
-        return tuple(grasp.covariance if grasp else None for grasp in self._placed_grasps())
-
-
-def _sums(stated: Sequence[Array | None], added: Array) -> tuple[Array | None, ...]:
-    """Covariances of all grasps with what is added to those of the last ones, shape (k, size, size)."""
-    before = len(stated) - len(added)
-    return tuple(
-        each if each is None or index < before else np.asarray(each + added[index - before])
-        for index, each in enumerate(stated)
-    )
