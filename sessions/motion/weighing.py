@@ -148,7 +148,7 @@ class Weigher:
             share, end = self._follow(lambda share: raised(share * height_m), height_m / s.lift_m_s)  # noqa: B023
             if end is LiftEnd.HUNG:
                 end = self._hang(raised, height_m)
-            if end is not LiftEnd.LOST and not self._set_down(raised, share * height_m):
+            if end is not LiftEnd.LOST and not self._set_down(raised, share * height_m, hung=end is LiftEnd.HUNG):
                 end = LiftEnd.ABOVE
             firm_N = self._grip.share_pressed(s.firm_share)
             if end is not LiftEnd.HELD or firm_N < _FIRMER * s.squeeze_N:
@@ -188,17 +188,19 @@ class Weigher:
         self._squeeze_N = usual_N
         return end
 
-    def _set_down(self, raised: Callable[..., Array], height_m: float) -> bool:
+    def _set_down(self, raised: Callable[..., Array], height_m: float, *, hung: bool) -> bool:
         """Down again; a little back if a fingertip is pressed: one that has slid up comes down on the object.
 
-        The object has crept down in the fingers, and stands before the hand is down: then they slide along it.
+        An object that hung free has crept down in the fingers, and stands before the hand is down: then they slide
+        along it. One on an edge is held until the hand is down: its weight is not all in the fingers anyway, and let go
+        of early it falls out of them.
 
         Returns:
             Whether the hand is down.
         """
         s, self._squeeze_N = self._settings, self._settings.squeeze_N
         held_N = self._motion.runtime.perception.held_N
-        stands_N = _STANDS_SHARE * held_N()
+        stands_N = _STANDS_SHARE * held_N() if hung else -np.inf
 
         def lowered(share: float) -> Array:
             if held_N() < stands_N:

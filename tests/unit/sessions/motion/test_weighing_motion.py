@@ -133,3 +133,15 @@ def test_a_fingertip_that_stays_pressed_ends_it():
 def test_the_height_of_the_only_lift_of_before_is_read_and_left_out():
     with recorded_keys():
         assert WeighingSettings.model_validate({"lift_m": 0.015}) == WeighingSettings()
+
+
+@pytest.mark.parametrize(("hangings", "loosens"), [((FREE, FREE), True), ((STANDS, STANDS), False)])
+def test_only_what_hung_free_is_let_slide_through_the_fingers_once_it_stands(hangings, loosens):
+    motion, forces_N = RecordingMotion(hangings=hangings), []
+
+    def is_down():  # by half of what it was lifted
+        return bool(motion.heights_m) and motion.heights_m[-1] < max(motion.heights_m) / 2
+
+    motion.runtime.perception.held_N = lambda: 1.0 if is_down() else 3.0
+    weigh(motion, hold=forces_N.append)
+    assert (WeighingSettings().landed_N in forces_N) is loosens
