@@ -250,25 +250,27 @@ class Toucher:
         """Every fingertip moves along a direction until it has the contact force, or has reached its limit.
 
         The hand sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction
-        itself. While a fingertip is pressed hard the hand draws back; for good once a link leans on something, and
-        then no finger goes on. Where only finding the object matters, links are not heeded.
+        itself. While a fingertip is pressed hard, or a link leans on something, the hand draws back; once a link has
+        done so it sinks no more. Where only finding the object matters, links are not heeded.
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._hand)
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         force_N = force_N if len(rates) > 1 else max(force_N, s.alone_N)
         gone_m = dict.fromkeys(rates, 0.0)
-        start, sunk_m, leans = motion.runtime.perception.hand.base_q.copy(), 0.0, False
+        start, sunk_m, has_leaned = motion.runtime.perception.hand.base_q.copy(), 0.0, False
         step_m = sink_m / motion.cycles(s.press_s)
         way = np.zeros(6)
         way[:3] = motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
         for _ in motion.shares(s.press_s + (_SUNK_s if sink_m else 0.0)):
-            leans = leans or (heeds_links and self.guard.leans())
-            is_pressed = leans or max(motion.loads_N().values(), default=0.0) >= s.most_N
-            sunk_m = float(np.clip(sunk_m + (-step_m if is_pressed else step_m), -sink_m, sink_m))
+            leans = heeds_links and self.guard.leans()
+            has_leaned |= leans
+            if leans or max(motion.loads_N().values(), default=0.0) >= s.most_N:
+                sunk_m = max(sunk_m - step_m, -sink_m)
+            elif not has_leaned:
+                sunk_m = min(sunk_m + step_m, sink_m)
             motion.set_base(start + sunk_m * way)
-            yielding = {} if leans else {f: load_N for f, load_N in motion.loads_N().items() if f in rates}
-            for finger, load_N in yielding.items():
+            for finger, load_N in ((f, load_N) for f, load_N in motion.loads_N().items() if f in rates):
                 moved_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
                 gone_m[finger] = float(np.clip(gone_m[finger] + moved_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)
