@@ -194,15 +194,18 @@ def test_a_tap_tells_what_it_met_even_where_the_hand_has_drawn_back_since(monkey
     np.testing.assert_allclose(felt[:, 2], 0.05, atol=3e-3)
 
 
-def test_the_hand_draws_back_for_good_where_a_link_leans_on_something(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("for_cycles", "higher"), [(0, -1), (1, 0), (1000, 1)])
+def test_a_hand_whose_link_leans_on_something_draws_back_until_it_leans_no_more_and_sinks_no_more(
+    monkeypatch: pytest.MonkeyPatch, for_cycles: int, higher: int
+) -> None:
     world = DiscWorld(None)
     motion = motion_on(world)
-    toucher, leans = Toucher(motion, QUICK, TIP), iter([False] * 20 + [True] + [False] * 1000)
+    toucher, leans = Toucher(motion, QUICK, TIP), iter([False] * 2 + [True] * for_cycles + [False] * 1000)
     monkeypatch.setattr(toucher.guard, "leans", lambda: next(leans))
     start_m = float(world.base_q[2])
     table, frame = closing(TAP.closing, TAP_HEIGHT_m, TIP), GraspFrame(0.0, 0.0, 0.0)
     toucher._lay_on(table, TAP, np.array([0.0, 0.0, -1.0]), frame, 0.35, 0.004)
-    assert world.base_q[2] > start_m + 0.002
+    assert round((float(world.base_q[2]) - start_m) / 0.004) == higher
 
 
 def test_contacts_probed_before_the_object_was_carried_are_forgotten() -> None:
