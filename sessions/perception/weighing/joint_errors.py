@@ -11,7 +11,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import detrend
 
 from drivers.core.contacts import Array
 from drivers.core.fingertip import ContinuousFingertip
@@ -50,10 +49,16 @@ def joint_errors(felt: NetWrench, turned: Sequence[NetWrench], sigma_rad: float)
     """
     upward_N = felt.force_N[:, 2]
     # steady weight and slow drift of the sensors say nothing
-    by_joint = detrend(np.array([each.force_N[:, 2] - upward_N for each in turned]) / STEP_rad)
+    by_joint = _without_trend(np.array([each.force_N[:, 2] - upward_N for each in turned]) / STEP_rad)
     information = np.eye(len(turned)) / sigma_rad**2 + by_joint @ by_joint.T / _UNEXPLAINED_N**2
     covariance: Array = np.asarray(np.linalg.inv(information), dtype=float)
-    return JointErrors(-covariance @ by_joint @ detrend(upward_N) / _UNEXPLAINED_N**2, covariance)
+    return JointErrors(-covariance @ by_joint @ _without_trend(upward_N) / _UNEXPLAINED_N**2, covariance)
+
+
+def _without_trend(values: Array) -> Array:
+    """Series in the last axis, without their mean and their linear trend."""
+    line = np.linalg.qr(np.vander(np.arange(values.shape[-1], dtype=float), 2))[0]
+    return np.asarray(values - values @ line @ line.T)
 
 
 def turned_wrenches(

@@ -40,8 +40,11 @@ def find_axis(contacts: WeightedContacts, largest_gap_rad: float = LARGEST_GAP_r
         weights = np.maximum(1 - misses / _OUTLYING_SIGMAS**2, 0.0) ** 2 / variance
     if _largest_gap_rad((points_m - axis_m)[weights > 0]) > largest_gap_rad:
         raise ShapeError("the contacts do not surround an axis")
-    information = (weights[:, None] * across).T @ across
-    return axis_m, float(np.sqrt(np.diag(np.linalg.inv(information)).max()))
+    try:
+        covariance = np.linalg.inv((weights[:, None] * across).T @ across)
+    except np.linalg.LinAlgError:  # their normals are all parallel
+        raise ShapeError("the contacts determine no axis") from None
+    return axis_m, float(np.sqrt(np.diag(covariance).max()))
 
 
 def _largest_gap_rad(arms_m: Array) -> float:
