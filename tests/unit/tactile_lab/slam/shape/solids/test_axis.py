@@ -11,9 +11,9 @@ from tactile_lab.slam.shape.solids.planes import WeightedContacts
 
 
 def test_two_opposite_faces_determine_no_axis() -> None:
-    y, z = np.meshgrid(np.linspace(-0.05, 0.05, 5), [0.01, 0.03])
+    y, z = np.meshgrid(np.linspace(-0.02, 0.02, 5), [0.01, 0.03])
     points_m = np.vstack([np.column_stack([np.full(10, x), y.ravel(), z.ravel()]) for x in (-0.03, 0.03)])
     normals = np.repeat([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], 10, axis=0)
-    contacts = WeightedContacts(points_m, normals, np.full(20, 1e6), np.full(20, 1e2))
+    contacts = WeightedContacts(points_m, normals, np.full(20, 1e6), np.full(20, 10.0))
     with pytest.raises(ShapeError, match="determine no axis"):
         find_axis(contacts)
