@@ -12,7 +12,6 @@ import numpy as np
 from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
-from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.guided.console import OperatorConsole
 from sessions.guided.motion import GuidedMotion
@@ -55,14 +54,14 @@ class GraspByKeys(GraspCycle):
 
     def descend(self, plan: GraspPlan) -> bool:
         self._free_the_hand()
-        if closing(plan.closing, plan.height_m, self._hand).is_sideways:
+        self._begin(plan)
+        self._above_m = None
+        if self._table().is_sideways:
             prompt = "The hand comes from the object's side. g: go as suggested"
             self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.GIVE_UP)
         else:
             prompt = "Move the hand around the object. g: go as suggested; arrows, r, f, comma, full stop: steps"
             self._console.enter(Stage.GUIDE, prompt, Ask.GO, Ask.MOVE, Ask.NEXT, Ask.GIVE_UP)
-        self._begin(plan)
-        self._above_m = None
         for request in self._guided.requests():
             if request.ask is Ask.GO:
                 arrived = super().descend(self.plan)

@@ -23,7 +23,7 @@ class GuidedDecisions(AutonomousDecisions):
     Args:
         estimator: client of the planner, which makes suggestions.
         console: the operator's console.
-        felt: the object is on the table, and was felt, before the first decision.
+        felt: the operator was asked to place the object, and whether to feel it, before the first decision.
     """
 
     def __init__(self, estimator: EstimatorClient, console: OperatorConsole, *, felt: bool = False) -> None:

@@ -68,6 +68,6 @@ def guided_roles(
     if guided.led_by == "hand" or not settings.probing.is_wanted:
         return SessionRoles(supervisor, performer, GuidedDecisions(client, console), client, guard=guard)
     prober = prober_for(motion, settings, hand)
-    felt = SurveyOnRequest(prober, motion, console).feel, prober.find_again
+    survey = SurveyOnRequest(prober, motion, console).feel
     decisions = GuidedDecisions(client, console, felt=True)
-    return SessionRoles(supervisor, performer, decisions, client, survey=felt[0], find=felt[1], guard=guard)
+    return SessionRoles(supervisor, performer, decisions, client, survey=survey, find=prober.find_again, guard=guard)

@@ -153,14 +153,15 @@ def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_
     if not len(low_m):
         return shape
     mesh = shape.mesh(_GRID_m, floor_m)
-    body, walls = SolidField(mesh, 0.0), _walls(mesh, on_rim_m.mean(axis=0))
+    middle_m = on_rim_m.mean(axis=0)
+    body, walls = SolidField(mesh, 0.0), _walls(mesh, middle_m)
     below_m = np.column_stack([low_m[:, :2], np.full(len(low_m), (rim_m + floor_m) / 2)])
     in_cavity = body.predict(below_m).mean_m < -_WITHIN_m
     away_m, _ = _from_walls(gpis.contacts_m[up & (heights_m > (rim_m + floor_m) / 2)], *walls)
     if not in_cavity.any() or away_m.max() > _THICKNESS_m[1]:
         return shape
     wall_m = float(np.clip(2 * _from_walls(on_rim_m, *walls)[0].mean(), *_THICKNESS_m))
-    hollow = Hollow(shape, mesh, gpis, on_rim_m.mean(axis=0), wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
+    hollow = Hollow(shape, mesh, gpis, middle_m, wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
     off_m = np.abs(hollow.field.predict(gpis.contacts_m).mean_m)
     before_m = np.abs(body.predict(gpis.contacts_m).mean_m)
     return hollow if np.sum(off_m > _OFF_m) <= np.sum(before_m > _OFF_m) else shape
