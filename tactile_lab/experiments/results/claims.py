@@ -106,15 +106,29 @@ class Claim(StrictModel):
     panels: list[Panel]
 
 
+class Headline(StrictModel):
+    """A sentence of the repository's front page.
+
+    Attributes:
+        text: in Markdown; ``{0}`` stands for the first figure.
+        goals: its figures.
+    """
+
+    text: str
+    goals: list[Goal]
+
+
 class Claims(StrictModel):
     """The overview.
 
     Attributes:
+        headlines: what the repository's front page says of the results.
         intro: text above the claims.
         claims: in their order.
         outro: text below the claims.
     """
 
+    headlines: list[Headline] = Field(default_factory=list)
     intro: str
     claims: list[Claim]
     outro: str

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from drivers.core.atomic_files import write_whole
 from tactile_lab.experiments.plots import draw
+from tactile_lab.experiments.results.headlines import front_page
 from tactile_lab.experiments.results.overview import overview
 from tactile_lab.experiments.results.pages import merge_plots, page
 from tactile_lab.experiments.results.stored_result import StoredResult
@@ -69,14 +70,14 @@ def make_pages(docs: Path) -> dict[str, str]:
 
 def publish(docs: Path) -> list[Path]:
     """Write what has changed, and return it. Raises as :func:`make_pages`, and WriteError."""
-    changed = _changed(docs, make_pages(docs))
+    pages = {docs / path: text for path, text in make_pages(docs).items()}
+    changed = _changed({**pages, **front_page(docs, stored_results(docs))})
     for path, text in changed.items():
         write_whole(path, text)
     return list(changed)
 
 
-def _changed(docs: Path, texts: Mapping[str, str]) -> dict[Path, str]:
-    files = {docs / path: text for path, text in texts.items()}
+def _changed(files: Mapping[Path, str]) -> dict[Path, str]:
     return {
         path: text for path, text in files.items() if not path.is_file() or path.read_text(encoding="utf-8") != text
     }

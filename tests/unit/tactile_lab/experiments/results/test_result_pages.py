@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tactile_lab.cli.main import main
+from tactile_lab.experiments.results.headlines import BEGIN, front_page
 from tactile_lab.experiments.results.page_ages import ASK, OLDER, answer, answer_overview
 from tactile_lab.experiments.results.publishing import ages, make_pages, publish, stored_results
 from tests.support.repository import REPOSITORY
@@ -26,6 +27,18 @@ def written() -> dict[str, str]:
 def test_the_pages_are_those_that_make_results_writes(written: dict[str, str]) -> None:
     differ = [path for path, text in written.items() if (DOCS / path).read_text(encoding="utf-8") != text]
     assert differ == [], RENEW
+
+
+def test_the_front_page_has_the_figures_of_the_stored_results() -> None:
+    ((file, text),) = front_page(DOCS, stored_results(DOCS)).items()
+    assert text == file.read_text(encoding="utf-8"), RENEW
+    headlines = [line for line in text.partition(BEGIN)[2].splitlines() if line.startswith("- ")]
+    assert len(headlines) >= 4
+
+
+def test_a_front_page_without_room_for_headlines_stays_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text("by hand")
+    assert front_page(tmp_path / "docs", {}) == {}
 
 
 def test_every_page_asks_for_the_age_of_all_its_tables(written: dict[str, str]) -> None:
