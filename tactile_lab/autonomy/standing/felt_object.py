@@ -13,14 +13,15 @@ from drivers.core.contacts import Array, Grasp
 from sessions.conductor.object_gone import OPENING_m
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
+from tactile_lab.autonomy.standing.roundness import is_round
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
 
 _LEAST_FOR_BOX = 4
 """Contacts that tell a box, and whether it is one."""
 
-_ASIDE_rad, _ROUND_rad = (0.0, np.radians(30.0), np.radians(-30.0)), np.radians(15.0)
-"""Yaws beside those across the sides of the box, where contacts' normals are on average so far from the sides': what is
-round has no sides. A hand that closes on the corner of a box pushes it away."""
+_ASIDE_rad = (0.0, np.radians(30.0), np.radians(-30.0))
+"""Yaws beside those across the sides of the box: what is round has no sides. A hand that closes on the corner of a box
+pushes it away, and makes it lean."""
 
 _FAR_m, _NEAR_m = 0.04, 0.010
 """What is touched farther than the first from all contacts is as new as can be; nearer than the second it is known."""
@@ -162,12 +163,12 @@ class FeltObject:
 
     @property
     def is_round(self) -> bool:
-        """Whether contacts' normals say that the box is no box."""
-        normals = np.array(self._normals).reshape(-1, 3)
-        normals = normals[on_sides(normals)]
-        angles = np.arctan2(normals[:, 1], normals[:, 0]) - self.box.world_T_box.theta()
-        off = np.abs(angles - np.round(angles / (np.pi / 2)) * (np.pi / 2))
-        return len(off) >= _LEAST_FOR_BOX and float(off.mean()) > _ROUND_rad
+        """Whether contacts say that the box is no box; see :func:`is_round`."""
+        points_m, normals = (np.array(some).reshape(-1, 3) for some in (self._points_m, self._normals))
+        beside, yaw_rad = on_sides(normals), self.box.world_T_box.theta()
+        if np.count_nonzero(beside) < _LEAST_FOR_BOX:
+            return False
+        return is_round(points_m[beside, :2], normals[beside, :2], self.middle_m, yaw_rad)
 
     @property
     def is_wide(self) -> bool:
