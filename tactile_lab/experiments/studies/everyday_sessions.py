@@ -31,6 +31,7 @@ from sessions.recording.recorder import NullRecorder
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.heuristic_planner import PlanSettings
 from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.truth.rotational_symmetry import modulo_mesh_symmetry, symmetry_turns
 from tactile_lab.experiments.cells import Cell, Setting, grid
 from tactile_lab.experiments.data.household import HOUSEHOLD
 from tactile_lab.experiments.data.silhouettes import places, silhouettes
@@ -170,11 +171,9 @@ def _ending(outcome: SessionOutcome) -> dict[str, Any]:
 def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, dimension: int) -> dict[str, Any]:
     """The model against the truth: everywhere, and in space also over what was touched, with a picture's lines."""
     seen = _as_it_lies(result, grasps, watch)
-    mesh, poses, truth, done = seen.mesh, seen.estimate, seen.world_T_body, seen.grasps
-    points = [grasp.points_world_m for grasp in done]
+    mesh, truth, done = seen.mesh, seen.world_T_body, seen.grasps
     shape = contour_figures(result.contour, true_outline(mesh)) if dimension == 2 else mesh_figures(result.mesh, mesh)
-    registration = registration_rms_mm(points, poses, truth, dimension) if done else None
-    figures = {**shape, "registration_mm": registration, **NOTHING_TOUCHED}
+    figures = {**shape, "registration_mm": registered_mm(seen, dimension) if done else None, **NOTHING_TOUCHED}
     if dimension == 3:
         figures["known_share"] = known_share(result.mesh, mesh, _yaws_rad(truth))
     if dimension == 3 and any(grasp.contacts for grasp in done):
@@ -183,20 +182,29 @@ def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, 
 
 
 @dataclass(frozen=True)
-class _Seen(TouchedObject):
+class SeenObject(TouchedObject):
     """An object with its true and estimated poses at the grasps that the model is made of."""
 
     estimate: Sequence[Pose3 | None] = ()
 
 
-def _as_it_lies(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) -> _Seen:
+def registered_mm(seen: SeenObject, dimension: int) -> float | None:
+    """How well contacts fit together, in millimetres; rotations of a round object about its axis do not count, as in
+    the evaluation of a session.
+    """
+    points = [grasp.points_world_m for grasp in seen.grasps]
+    poses = modulo_mesh_symmetry(seen.estimate, seen.world_T_body, seen.mesh, symmetry_turns(seen.mesh))
+    return registration_rms_mm(points, poses, seen.world_T_body, dimension)
+
+
+def _as_it_lies(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) -> SeenObject:
     """The object as it stands or, after a fall, lies: its mesh upright there, and the grasps from then on."""
     count = min(len(result.world_T_object), len(watch.truth), len(grasps))
     begun = max([0, *(place for place, grasp in enumerate(grasps[:count]) if grasp.begins_anew)])
     lying = spatial(planar(watch.truth[begun])).inverse() * watch.truth[begun] if begun else Pose3()
     mesh = trimesh.Trimesh(transform_points(lying, watch.mesh.vertices), watch.mesh.faces, process=False)
     truth = [pose * lying.inverse() for pose in watch.truth[begun:count]]
-    return _Seen(mesh, truth, grasps[begun:count], result.world_T_object[begun:count])
+    return SeenObject(mesh, truth, grasps[begun:count], result.world_T_object[begun:count])
 
 
 def _yaws_rad(world_T_body: Sequence[Pose3]) -> list[tuple[float, float]]:
@@ -206,7 +214,7 @@ def _yaws_rad(world_T_body: Sequence[Pose3]) -> list[tuple[float, float]]:
     return [(low - heading, high - heading) for heading in headings_rad] or [ANY_YAW_rad]
 
 
-def _picture(result: SlamResult, seen: _Seen) -> dict[str, Any]:
+def _picture(result: SlamResult, seen: SeenObject) -> dict[str, Any]:
     """Silhouettes of the object and of the model laid over it, and where contacts were, in the object's frame."""
     pairs = list(zip(seen.world_T_body, seen.grasps, strict=False))
     by_kind = {
