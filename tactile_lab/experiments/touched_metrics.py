@@ -18,9 +18,7 @@ from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import rotate, spatial, transform_points
-from drivers.shadow.closing.posture import HandShape
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
-from tactile_lab.experiments.runs.reachable import ANY_YAW_rad, are_in_reach
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
@@ -40,12 +38,6 @@ NOTHING_TOUCHED: dict[str, Any] = {
     "touched_within_2_sigma": None,
     "touched_share": None,
 }
-
-KNOWN_m = 0.005
-"""A place of the surface is known where the model is no farther from it, and says that it is not."""
-
-_PLACES = 1_000
-"""Places that are looked at: the share is right to 0.02."""
 
 _FACING_AWAY = -0.5
 _UNDERSIDE = -0.9
@@ -131,30 +123,6 @@ def touched_outline_figures(data: PlanarGrasps, result: SlamResult) -> dict[str,
         "touched_within_2_sigma": float(np.mean(errors_m <= 2 * sigma_m)),
         "touched_share": float(np.mean(is_near)),
     }
-
-
-def known_share(
-    estimate: SurfaceMesh | None, truth: trimesh.Trimesh, yaws_rad: Sequence[tuple[float, float]] = (ANY_YAW_rad,)
-) -> float:
-    """Share of the surface in a fingertip's reach where the model is within :data:`KNOWN_m`, at the best fit, and says
-    so with two standard deviations; 0 without a model.
-
-    Args:
-        estimate: the model.
-        truth: the object as it stands on the table, its lowest point on it.
-        yaws_rad: of the hand, from lowest to highest, seen from the object.
-    """
-    if estimate is None:
-        return 0.0
-    points_m, normals = sample_mesh_with_normals(truth, _PLACES)
-    reached = are_in_reach(truth, points_m, normals, yaws_rad, HandShape())
-    seen = trimesh.Trimesh(estimate.vertices, estimate.faces, process=False)
-    fit = align_meshes(seen, truth, upright=True)
-    moved = trimesh.Trimesh(transform_points(fit, estimate.vertices), estimate.faces, process=False)
-    near = cKDTree(np.asarray(moved.vertices)).query(points_m[reached])[1]
-    is_known = distances_to_mesh(points_m[reached], moved) <= KNOWN_m
-    is_known &= 2 * estimate.sigma_m[near] <= KNOWN_m
-    return float(np.mean(is_known)) if reached.any() else 0.0
 
 
 class _Contacts:

@@ -59,6 +59,7 @@ EVERYDAY_OBJECTS = Experiment(
         Column("Hausdorff where touched, mm", "touched_hausdorff_mm"),
         Column("touched share", "touched_share", 0, kind="percent"),
         Column("share in reach known to 5 mm", "known_share", 0, kind="percent"),
+        Column("Hausdorff in reach, mm", "reach_hausdorff_mm"),
         REGISTRATION,
         Column("simulated minutes", "minutes", 1, kind="median"),
         Column("processor minutes", "cpu_minutes", 1, kind="median"),

@@ -39,8 +39,9 @@ from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_P
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
 from tactile_lab.experiments.runs.reachable import ANY_YAW_rad
+from tactile_lab.experiments.runs.reached_metrics import reach_figures
 from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
-from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, known_share, touched_figures
+from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.slam.result import SlamResult
@@ -175,7 +176,7 @@ def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, 
     shape = contour_figures(result.contour, true_outline(mesh)) if dimension == 2 else mesh_figures(result.mesh, mesh)
     figures = {**shape, "registration_mm": registered_mm(seen, dimension) if done else None, **NOTHING_TOUCHED}
     if dimension == 3:
-        figures["known_share"] = known_share(result.mesh, mesh, _yaws_rad(truth))
+        figures |= reach_figures(result.mesh, mesh, _yaws_rad(truth))
     if dimension == 3 and any(grasp.contacts for grasp in done):
         return {**figures, **touched_figures(seen, result), **_picture(result, seen)}
     return figures

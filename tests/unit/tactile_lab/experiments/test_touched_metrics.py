@@ -15,7 +15,6 @@ from tactile_lab.experiments.data.planar_data import simulate_section
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps, simulate
 from tactile_lab.experiments.touched_metrics import (
     NOTHING_TOUCHED,
-    known_share,
     touched_figures,
     touched_outline_figures,
 )
@@ -81,16 +80,6 @@ def test_grasps_at_all_heights_reach_from_the_foot_to_the_top(name: str, least_m
     heights = np.concatenate([grasp.points_world_m[:, 2] for grasp in data.grasps])
     assert 1e3 * np.ptp(heights) > least_mm
     assert heights.min() < 0.025
-
-
-@pytest.mark.parametrize(("sigma_m", "wider_m", "share"), [(1e-3, 0.0, 1.0), (1e-3, 0.012, 0.55), (4e-3, 0.0, 0.0)])
-def test_known_is_where_the_model_is_near_and_says_so(sigma_m: float, wider_m: float, share: float) -> None:
-    estimate = told(touched_at_low_x(), box(wider_m=wider_m), sigma_m).mesh
-    assert known_share(estimate, box()) == pytest.approx(share, abs=0.12)
-
-
-def test_nothing_is_known_without_a_model() -> None:
-    assert known_share(None, box()) == 0.0
 
 
 @pytest.mark.parametrize(("wider_m", "within"), [(0.0, 1.0), (0.004, 0.0)])
