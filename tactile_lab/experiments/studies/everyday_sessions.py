@@ -37,9 +37,9 @@ from tactile_lab.experiments.data.household import HOUSEHOLD
 from tactile_lab.experiments.data.silhouettes import places, silhouettes
 from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_PREFIX, ycb_path
 from tactile_lab.experiments.data.true_surface import true_outline
+from tactile_lab.experiments.reach.reachable import ANY_YAW_rad
+from tactile_lab.experiments.reach.reached_metrics import reach_figures
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
-from tactile_lab.experiments.runs.reachable import ANY_YAW_rad
-from tactile_lab.experiments.runs.reached_metrics import reach_figures
 from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world

@@ -7,7 +7,7 @@ import trimesh
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.posture import HandShape
-from tactile_lab.experiments.runs.reachable import ANY_YAW_rad, Mask, are_in_reach
+from tactile_lab.experiments.reach.reachable import ANY_YAW_rad, Mask, are_in_reach
 from tactile_lab.slam.shape.surfaces.sampling import sample_mesh_with_normals
 
 TOP_m = 0.10

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 from drivers.shadow.closing.posture import HandShape
-from tactile_lab.experiments.runs.reachable import ANY_YAW_rad, Mask, are_in_reach
+from tactile_lab.experiments.reach.reachable import ANY_YAW_rad, Mask, are_in_reach
 from tactile_lab.slam.shape.metrics.alignment import align_meshes
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh_with_normals
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from tactile_lab.experiments.runs.reached_metrics import NOTHING_KNOWN, reach_figures
+from tactile_lab.experiments.reach.reached_metrics import NOTHING_KNOWN, reach_figures
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
 
