@@ -50,6 +50,9 @@ _DOUBTFUL_CHI_SQUARE = 16.0
 _MOST_DOUBTS = 12
 """Contacts that are tested again: on faces of this few, or this far from theirs, and at most this many."""
 
+_MOST_LONE = 3
+"""Contacts alone on a face that are taken for wrong ones together."""
+
 _HOPELESS_nats = 100.0
 """Flat faces that are less likely than the field by more than this are rejected, whichever contacts are left out."""
 
@@ -179,19 +182,42 @@ class FacetedScorer:
         return Hypothesis(contact_map, misfit, intrusion, self._scorer.price(contact_map))
 
     def _sharp_without_one(self, contact_map: ContactMap) -> Hypothesis | None:
-        """The most likely sharp outline of all contacts but one of those that the field explains worst.
-
-        A single wrong contact can be enough for faces that enclose nothing. In space this identifies round bodies.
+        """The most likely sharp shape of all contacts but one that may be wrong: that can be enough for faces that
+        enclose nothing.
         """
-        if contact_map.dimension == 3 or not self._mechanisms.has("without one"):
+        if not self._mechanisms.has("without one"):
             return None
+        found = (
+            self._solid_without_lone(contact_map)
+            if contact_map.dimension == 3
+            else self._outline_without_one(contact_map)
+        )
+        if found is not None:
+            self._mechanisms.changed.add("without one")
+        return found
+
+    def _outline_without_one(self, contact_map: ContactMap) -> Hypothesis | None:
+        """Without one of the contacts that the field explains worst."""
         costs = contact_map.fit().leave_one_out_costs(np.arange(len(contact_map.contacts)))
         worst = [contact_map.origins[each] for each in np.argsort(-costs)[:_MOST_DOUBTS]]
         found = [self._sharp(contact_map.without_contact(*each)) for each in worst]
-        best = min((each for each in found if each is not None), key=cost, default=None)
-        if best is not None:
-            self._mechanisms.changed.add("without one")
-        return best
+        return min((each for each in found if each is not None), key=cost, default=None)
+
+    def _solid_without_lone(self, contact_map: ContactMap) -> Hypothesis | None:
+        """Smoothed without the contacts that are alone on their faces, if these are few; many are those of a round
+        body.
+        """
+        faceted = smoothed_with_faces(contact_map, self._noise) if self._mechanisms.has("faces") else None
+        if faceted is None:
+            return None
+        sizes = np.bincount(faceted.faces.labels, minlength=faceted.faces.count)
+        lone = np.flatnonzero(sizes[faceted.faces.labels] == 1)
+        if not 0 < len(lone) <= _MOST_LONE:
+            return None
+        fewer = contact_map
+        for each in lone:
+            fewer = fewer.without_contact(*contact_map.origins[each])
+        return self.smooth_with_facets(fewer)
 
     def _reconsider(self, sharp: Hypothesis) -> Hypothesis:
         """Leave out contacts that a sharp shape explains only by themselves; restore those it explains better."""
