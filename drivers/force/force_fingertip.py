@@ -59,7 +59,8 @@ class ForceTip:
         self._capture: deque[Array] = deque(maxlen=CAPTURE_LIMIT)
         self._void = 0
         self._judge = WrenchMonitor(settings.plausibility)
-        self._range = np.array([*settings.force_range_N, *settings.torque_range_Nm])
+        self._limits = [*settings.force_range_N, *settings.torque_range_Nm]
+        self._range = np.array(self._limits)
         mounting = calibration.distal_T_sensor.pose()
         centre = np.array(calibration.centre_distal_m)
         self._to_centre = wrench_transform(mounting.rotation().matrix(), mounting.translation() - centre)
@@ -69,13 +70,10 @@ class ForceTip:
 
     def update(self, samples: Sequence[WrenchSample]) -> None:
         """Take decoded samples, oldest first; those older than one already seen are counted and ignored."""
-        if not samples:
-            return
-        in_range = (np.abs(np.array([sample.wrench for sample in samples])) <= self._range).all(axis=1).tolist()
-        for sample, within in zip(samples, in_range, strict=True):
+        for sample in samples:
             if not self.sequences.is_new(sample.sent, sample.measured):
                 continue
-            self.newest, self._newest_usable = sample, within and self._sound(sample)
+            self.newest, self._newest_usable = sample, self._sound(sample) and self._is_in_range(sample.wrench)
             if self._newest_usable:
                 self._recent.append(sample.wrench)
                 self._capture.append(sample.wrench)
@@ -136,11 +134,11 @@ class ForceTip:
         """Which axis of the newest sample exceeds its limit, as text; empty if none."""
         if self.newest is None:
             return ""
-        share = np.abs(self.newest.wrench) / self._range
-        if not (share > self._settings.limit_share).any():
+        shares = [abs(value) / limit for value, limit in zip(self.newest.wrench.tolist(), self._limits, strict=True)]
+        largest = max(shares)
+        if not largest > self._settings.limit_share:
             return ""
-        axis = int(np.argmax(share))
-        return f"{AXES[axis]} at {100 * share[axis]:.0f} % of the calibration range"
+        return f"{AXES[shares.index(largest)]} at {100 * largest:.0f} % of the calibration range"
 
     @property
     def noise(self) -> Array:
@@ -239,6 +237,10 @@ class ForceTip:
 
     def _sound(self, sample: WrenchSample) -> bool:
         return not sample.faults and not self.sequences.stuck
+
+    def _is_in_range(self, wrench: Array) -> bool:
+        """Whether it is six numbers within the calibrated range; of so few, plain ones are quicker than arrays."""
+        return all(abs(value) <= limit for value, limit in zip(wrench.tolist(), self._limits, strict=True))
 
     def _weight(self, world_R_distal: Array) -> Array:
         """The tip's own weight as measured by the sensor, shape (6,), sensor frame."""

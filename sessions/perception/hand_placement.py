@@ -29,6 +29,7 @@ class HandPlacement:
         self._mount_T_forearm, self._world_T_mount, self._form = mount_T_forearm, world_T_mount, form
         self._joints_rad: Array | None = None
         self._base_q: Array | None = None
+        self._forearm: Array | None = None
         self._geometry: HandGeometry | None = None
 
     @property
@@ -43,7 +44,7 @@ class HandPlacement:
 
     def take_base(self, base_q: Array) -> Array:
         """Newest positioner joints, shape (6,), metres and radians, as an array."""
-        self._base_q, self._geometry = np.asarray(base_q, dtype=float), None
+        self._base_q, self._forearm, self._geometry = np.asarray(base_q, dtype=float), None, None
         return self._base_q
 
     def latest(self) -> tuple[Array, Array]:
@@ -67,7 +68,9 @@ class HandPlacement:
     @property
     def world_T_forearm(self) -> Array:
         """The forearm by the newest positioner joints, shape (4, 4). Raises DeviceError before the first."""
-        return self._world_T_forearm(self.base_q)
+        if self._forearm is None:
+            self._forearm = self._world_T_forearm(self.base_q)
+        return self._forearm
 
     @property
     def world_T_palm(self) -> Pose3:
@@ -93,12 +96,16 @@ class HandPlacement:
     def current(self) -> HandGeometry:
         """Geometry from the newest joints. Raises DeviceError before the first."""
         if self._geometry is None:
-            self._geometry = self.place(*self.latest())
+            joints_rad, _ = self.latest()
+            self._geometry = self._place(joints_rad, self.world_T_forearm)
         return self._geometry
 
     def place(self, joints_rad: Array, base_q: Array) -> HandGeometry:
         """Geometry from these joints."""
-        world_T_palm = self._world_T_forearm(base_q) @ forearm_T_palm_matrix(joints_rad, self._form.side)
+        return self._place(joints_rad, self._world_T_forearm(base_q))
+
+    def _place(self, joints_rad: Array, world_T_forearm: Array) -> HandGeometry:
+        world_T_palm = world_T_forearm @ forearm_T_palm_matrix(joints_rad, self._form.side)
         return HandGeometry(joints_rad, world_T_palm, self._form.side)
 
     def _world_T_forearm(self, base_q: Array) -> Array:

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from drivers.camera.packet import picture_of
 from drivers.core.clock import VirtualClock
@@ -34,8 +33,7 @@ def fingertip_link(finger: str) -> str:
     return f"ft/{finger}"
 
 
-@dataclass(frozen=True)
-class Heard:
+class Heard(NamedTuple):
     """A sample and its arrival."""
 
     stamp_ns: int

@@ -5,6 +5,7 @@ stated noise holds the truth.
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,12 +18,19 @@ from sessions.perception.interpreter import HAND_LINK
 from tactile_lab.experiments.data.spoilt_samples import AS_MEASURED
 from tactile_lab.experiments.runs import carried_objects
 from tactile_lab.experiments.runs.carried_objects import CarryWatch, WatchedCarry, watch_carries
+from tests.support.low_rig import BRISK_WAY, low_rig
 
 SEED = 5
 SOON, LATER = 20, 30
 """Cycles after the beginning of the carry."""
 
 Interfere = Callable[[Plant, int], None]
+
+
+@pytest.fixture(autouse=True)
+def brisk_way(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The hand comes down briskly; it grasps and carries as usual."""
+    monkeypatch.setattr(carried_objects, "RIG", str(low_rig(tmp_path, cycle=BRISK_WAY)))
 
 
 def carry_with(

@@ -12,6 +12,7 @@ import base64
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -179,6 +180,7 @@ def received_transport(topic: str) -> str | None:
     return link_of(topic) if is_raw(topic) and topic.endswith("/rx") else None
 
 
+@lru_cache(maxsize=64)  # asked for every message
 def stamper_of(topic: str) -> str | None:
     """Name of the transport that stamps a topic's messages; None if the program stamps them."""
     return "camera" if topic == IMAGE_TOPIC else received_transport(topic)

@@ -18,8 +18,8 @@ import time
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 TAIL_BYTES = 4 << 20
 """At full load two seconds and a half: as long as the disk may stand still before a kill costs anything."""
@@ -35,8 +35,7 @@ _HEAD_BYTES = 4096
 _YOUNG_s = 60.0
 
 
-@dataclass(frozen=True)
-class TailMessage:
+class TailMessage(NamedTuple):
     """A message as it would stand in the file: topic, number, log time and own stamp, content."""
 
     topic: str

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 from drivers.core.errors import DeviceError
@@ -71,7 +70,7 @@ class Reorder(Fault):
 
     def spare(self, datagram: Datagram) -> list[Datagram]:
         late, self._late = self._late, []
-        return [datagram, *(replace(message, stamp_ns=datagram.stamp_ns) for message in late)]
+        return [datagram, *(message._replace(stamp_ns=datagram.stamp_ns) for message in late)]
 
 
 class Delay(Fault):
@@ -92,7 +91,7 @@ class Delay(Fault):
             self._late.append(datagram)
             return []
         late, self._late = self._late, []
-        return [*(replace(message, stamp_ns=datagram.stamp_ns) for message in late), datagram]
+        return [*(message._replace(stamp_ns=datagram.stamp_ns) for message in late), datagram]
 
     def release_held(self) -> list[Datagram]:
         self._left = max(0, self._left - 1)
@@ -108,7 +107,7 @@ class Truncate(Fault):
         self._missing = missing
 
     def strike(self, datagram: Datagram) -> list[Datagram]:
-        return [replace(datagram, payload=datagram.payload[: -self._missing])]
+        return [datagram._replace(payload=datagram.payload[: -self._missing])]
 
 
 class FlipBit(Fault):
@@ -125,7 +124,7 @@ class FlipBit(Fault):
         damaged = bytearray(datagram.payload)
         place = self._bit % (8 * len(damaged))
         damaged[place // 8] ^= 1 << place % 8
-        return [replace(datagram, payload=bytes(damaged))]
+        return [datagram._replace(payload=bytes(damaged))]
 
 
 class StaleSequence(Fault):
@@ -141,7 +140,7 @@ class StaleSequence(Fault):
         payload = datagram.payload
         for field, value in zip(self._layout.counters, self._before or [], strict=False):
             payload = field.write(payload, value)
-        return [replace(datagram, payload=self._layout.sealed(payload))]
+        return [datagram._replace(payload=self._layout.sealed(payload))]
 
     def spare(self, datagram: Datagram) -> list[Datagram]:
         self._before = [field.read(datagram.payload) for field in self._layout.counters]
@@ -166,7 +165,7 @@ class CounterWrap(Fault):
             self._shifts = [-field.read(payload) - self._at for field in self._layout.counters]
         for field, shift in zip(self._layout.counters, self._shifts, strict=True):
             payload = field.write(payload, field.read(payload) + shift)
-        return [replace(datagram, payload=self._layout.sealed(payload))]
+        return [datagram._replace(payload=self._layout.sealed(payload))]
 
 
 class Saturate(Fault):
@@ -180,7 +179,7 @@ class Saturate(Fault):
         self._saturate = layout.saturate
 
     def strike(self, datagram: Datagram) -> list[Datagram]:
-        return [replace(datagram, payload=self._saturate(datagram.payload))]
+        return [datagram._replace(payload=self._saturate(datagram.payload))]
 
 
 class StuckValue(Fault):
@@ -203,7 +202,7 @@ class StuckValue(Fault):
         if self._layout.counters[1:]:
             field = self._layout.counters[-1]
             payload = field.write(payload, field.read(kept))
-        return [replace(datagram, payload=self._layout.sealed(payload))]
+        return [datagram._replace(payload=self._layout.sealed(payload))]
 
 
 class Unplug(Fault):
@@ -228,7 +227,7 @@ class ClockJump(Fault):
         return self.spare(datagram)
 
     def spare(self, datagram: Datagram) -> list[Datagram]:
-        return [replace(datagram, stamp_ns=datagram.stamp_ns + self._off_ns)]
+        return [datagram._replace(stamp_ns=datagram.stamp_ns + self._off_ns)]
 
 
 class FarEnd(Fault):
