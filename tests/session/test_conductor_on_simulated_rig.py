@@ -19,6 +19,7 @@ from sessions.conductor.conductor import Conductor
 from sessions.conductor.policy_decisions import Approve, approve_everything
 from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import Ending, SessionOutcome
+from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.probing.box_prober import ProbingSettings
 from sessions.motion.safety import SafetySettings
 from sessions.recording.recorder import Recorder
@@ -31,6 +32,7 @@ from tactile_lab.autonomy.variance_planner import ExplorationSettings
 from tactile_lab.rigs.build import build_runtime
 from tactile_lab.rigs.description import load_rig
 from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tests.support.low_rig import BRISK_WAY
 
 SEED = 0
 
@@ -102,6 +104,7 @@ def run(
         exploration=carrying,
         probing=at_once,
         weighings=weighings,
+        cycle=CycleSettings(**BRISK_WAY),
     )
     runtime.connect()
     try:
