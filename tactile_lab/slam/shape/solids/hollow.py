@@ -31,7 +31,7 @@ _BELOW_RIM_m, _WITHIN_m = 0.004, 0.008
 neck, over a shoulder.
 """
 
-_GRID_m = 0.003
+_RIM_WALL_m, _GRID_m = 0.008, 0.003
 _THICKNESS_m, _LEAST_FLOOR_m = (0.004, 0.010), 0.006
 """Of walls, none so thin that the grid misses it, and least thickness of the floor."""
 
@@ -149,12 +149,14 @@ def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_
         return shape
     rim_m, on_rim_m = float(np.median(heights_m[rim])), gpis.contacts_m[rim]
     low_m = free_points_m[free_points_m[:, 2] < rim_m - _BELOW_RIM_m]
-    low_m = low_m[_surrounded(low_m, on_rim_m)]
     if not len(low_m):
         return shape
     mesh = shape.mesh(_GRID_m, floor_m)
     middle_m = on_rim_m.mean(axis=0)
     body, walls = SolidField(mesh, 0.0), _walls(mesh, middle_m)
+    low_m = low_m[_surrounded(low_m, np.vstack([on_rim_m, _near_rim(*walls, rim_m)]))]
+    if not len(low_m):
+        return shape
     below_m = np.column_stack([low_m[:, :2], np.full(len(low_m), (rim_m + floor_m) / 2)])
     in_cavity = body.predict(below_m).mean_m < -_WITHIN_m
     away_m, _ = _from_walls(gpis.contacts_m[up & (heights_m > (rim_m + floor_m) / 2)], *walls)
@@ -165,6 +167,14 @@ def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_
     off_m = np.abs(hollow.field.predict(gpis.contacts_m).mean_m)
     before_m = np.abs(body.predict(gpis.contacts_m).mean_m)
     return hollow if np.sum(off_m > _OFF_m) <= np.sum(before_m > _OFF_m) else shape
+
+
+def _near_rim(vertices: Array, faces: Array, rim_m: float) -> Array:
+    """Middles of the triangles of walls close below the rim, shape (n, 3): it goes all around, though few places of it
+    were touched.
+    """
+    middles_m = vertices[faces].mean(axis=1)
+    return np.asarray(middles_m[(middles_m[:, 2] < rim_m) & (middles_m[:, 2] > rim_m - _RIM_WALL_m)])
 
 
 def _surrounded(places_m: Array, around_m: Array) -> Mask:

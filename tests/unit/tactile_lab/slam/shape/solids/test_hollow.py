@@ -20,13 +20,13 @@ IN_CUP_m = np.array([[0.0, 0.0, 0.070], [0.008, 0.0, 0.066], [-0.005, 0.008, 0.0
 CUP = turned([0, 36, 36, 31, 31, 0], [0, 0, 80, 80, 5, 5])
 
 
-def felt(rim_m: float) -> Gpis:
-    """Contacts on the outer wall at three heights, and on the top, so far from the axis."""
+def felt(rim_m: float, on_top: int = 10) -> Gpis:
+    """Contacts on the outer wall at three heights, and so many of ten on the top, so far from the axis."""
     around = np.linspace(0, 2 * np.pi, 10, endpoint=False)
     out = np.column_stack([np.cos(around), np.sin(around), np.zeros(10)])
     walls = [RADIUS_m * out + [0, 0, z] for z in (0.02, 0.045, 0.07)]
-    points_m = np.vstack([*walls, rim_m * out + [0, 0, HIGH_m]])
-    normals = np.vstack([out, out, out, np.tile([0.0, 0.0, 1.0], (10, 1))])
+    points_m = np.vstack([*walls, rim_m * out[:on_top] + [0, 0, HIGH_m]])
+    normals = np.vstack([out, out, out, np.tile([0.0, 0.0, 1.0], (on_top, 1))])
     return Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
 
 
@@ -42,6 +42,12 @@ def test_a_cup_is_hollow_where_fingers_went_down_inside_its_rim() -> None:
     assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
     assert distances_to_mesh(CUP.vertices, mesh).max() < 0.006
     assert np.mean(distances_to_mesh(mesh.vertices, CUP)) < 0.0015
+
+
+def test_a_cup_is_hollow_though_its_rim_was_touched_on_one_side_only() -> None:
+    hollow = shape_of(felt(RADIUS_m - WALL_m / 2, on_top=4), IN_CUP_m)
+    assert isinstance(hollow, Hollow)
+    assert np.mean(distances_to_mesh(hollow.mesh().vertices, CUP)) < 0.0025
 
 
 def test_a_model_that_was_told_of_the_fingers_is_hollow_as_well() -> None:
