@@ -52,6 +52,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         exploration.TABLE_4_3,
         exploration.EXPLORATION_HAND,
         exploration.EXPLORATION_KINEMATIC,
+        exploration.EXPLORATION_FELT,
         everyday.EVERYDAY_OBJECTS,
         everyday.HANDS,
         carrying.CARRIES,

@@ -11,7 +11,7 @@ from gtsam import Pose2
 from drivers.core.contacts import FINGERS, Array, Contact, StepSigma
 from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.protocol.palm_images import Side
-from sessions.perception.carrying.carry_noise import CarryNoise, LinkTimes
+from sessions.perception.carrying.carry_noise import UNPUSHED, CarryNoise, LinkTimes
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
 from sessions.perception.carrying.lifted import lifted_motions, raised
@@ -122,7 +122,7 @@ class CarryOdometry:
         half_width_m = min(max(half_m, _LEAST_HALF_WIDTH_m), _LARGEST_HALF_WIDTH_m)
         return self.measured.known(Friction(half_width_m=half_width_m))
 
-    def closed(self, sigma: StepSigma, closing_N: float, links: LinkTimes = LinkTimes()) -> StepSigma:  # noqa: B008
+    def closed(self, sigma: StepSigma, closing_N: float, links: LinkTimes = UNPUSHED) -> StepSigma:
         """How well the object's place is known once the hand has closed again.
 
         Args:

@@ -22,6 +22,10 @@ class LinkTimes:
     opened_s: float = 0.0
 
 
+UNPUSHED = LinkTimes()
+"""No link was on the object."""
+
+
 @dataclass(frozen=True)
 class CarryNoise:
     """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83).

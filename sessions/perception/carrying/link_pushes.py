@@ -89,21 +89,20 @@ class LinkPushes:
         if samples.motor_counts is None or np.isnan(samples.motor_counts).any():
             return 0.0
         self._closings.append(newest := self._closing(samples, samples.motor_counts))
-        coefficients, limits = _free_motions(self._closings)
-        beyond = np.abs(newest.counts - np.einsum("nmk,mk->nm", newest.terms, coefficients)) > limits
-        return self._time_s(beyond & newest.usable)
+        free = _FreeMotions.of(self._closings)
+        return self._time_s((free.off(newest) > free.limits) & newest.usable)
 
     def opened_s(self, samples: CarrySamples) -> float:
         """How long links of untouched fingers pushed while the hand opened, the fingers' times added.
 
-        Fingers that open are faster than those that close, and those tell less of how they move freely.
+        Fingers that open are faster than those that close, and those tell less of how they move freely: nothing of a
+        motor that hardly moved in them.
         """
         if not self._closings or samples.motor_counts is None or np.isnan(samples.motor_counts).any():
             return 0.0
-        opening = self._closing(samples, samples.motor_counts)
-        coefficients, limits = _free_motions(self._closings)
-        off = np.abs(opening.counts - np.einsum("nmk,mk->nm", opening.terms, coefficients))
-        return self._time_s((off > _OPENED_COUNTS) & np.isfinite(limits) & opening.usable)
+        free, opening = _FreeMotions.of(self._closings), self._closing(samples, samples.motor_counts)
+        pushes = free.off(opening) > np.maximum(_OPENED_COUNTS, free.limits * free.leverage(opening))
+        return self._time_s(pushes & opening.usable)
 
     def landed_s(self, samples: CarrySamples) -> float:
         """How long links were on something while the open hand came down, the fingers' times added."""
@@ -132,24 +131,48 @@ class LinkPushes:
         return _Closing(np.stack(terms, axis=-1), counts, untouched & ~at_end & self._watched)
 
 
-def _free_motions(closings: deque[_Closing]) -> tuple[Array, Array]:
-    """Coefficients of each motor's free motion, shape (20, 4), and what counts beyond it are a push, shape (20,)."""
-    terms = np.concatenate([each.terms[::_EVERY] for each in closings]).transpose(1, 0, 2)
-    counts = np.concatenate([each.counts[::_EVERY] for each in closings]).T
-    usable = np.concatenate([each.usable[::_EVERY] for each in closings]).T
-    weights, number = usable.astype(float), usable.sum(axis=1)
-    coefficients, scatter = np.zeros(terms.shape[::2]), np.full(len(terms), np.inf)
-    for _ in range(_FITS):
-        weighted = terms * weights[..., None]
-        normal = weighted.transpose(0, 2, 1) @ terms + 1e-3 * np.eye(terms.shape[-1])
-        coefficients = np.linalg.solve(normal, np.einsum("mnk,mn->mk", weighted, counts)[..., None])[..., 0]
-        off = np.abs(counts - (terms @ coefficients[..., None])[..., 0])
-        ordered = np.sort(np.where(usable, off, np.inf), axis=1)
-        scatter = _MEDIAN_TO_SIGMA * ordered[range(len(off)), number // 2]
-        width = 2 * np.clip(scatter, _LEAST_COUNTS / 7, 1e6)
-        weights = usable / (1 + (off / width[:, None]) ** 2)
-    enough = number >= _FIT_SAMPLES / _EVERY
-    return coefficients, np.where(enough, np.maximum(_LEAST_COUNTS, _SIGMAS * scatter), np.inf)
+@dataclass(frozen=True)
+class _FreeMotions:
+    """How the motors move free fingers.
+
+    Attributes:
+        coefficients: of the terms, shape (20, 4).
+        limits: counts beyond them that are a push, shape (20,); infinite for a motor that too little is known of.
+        spread: covariance of the coefficients for counts that scatter by one, shape (20, 4, 4).
+    """
+
+    coefficients: Array
+    limits: Array
+    spread: Array
+
+    @classmethod
+    def of(cls, closings: deque[_Closing]) -> _FreeMotions:
+        """Fitted to closings, robustly."""
+        terms = np.concatenate([each.terms[::_EVERY] for each in closings]).transpose(1, 0, 2)
+        counts = np.concatenate([each.counts[::_EVERY] for each in closings]).T
+        usable = np.concatenate([each.usable[::_EVERY] for each in closings]).T
+        weights, number = usable.astype(float), usable.sum(axis=1)
+        coefficients, scatter = np.zeros(terms.shape[::2]), np.full(len(terms), np.inf)
+        for _ in range(_FITS):
+            weighted = terms * weights[..., None]
+            normal = weighted.transpose(0, 2, 1) @ terms + 1e-3 * np.eye(terms.shape[-1])
+            coefficients = np.linalg.solve(normal, np.einsum("mnk,mn->mk", weighted, counts)[..., None])[..., 0]
+            off = np.abs(counts - (terms @ coefficients[..., None])[..., 0])
+            ordered = np.sort(np.where(usable, off, np.inf), axis=1)
+            scatter = _MEDIAN_TO_SIGMA * ordered[range(len(off)), number // 2]
+            width = 2 * np.clip(scatter, _LEAST_COUNTS / 7, 1e6)
+            weights = usable / (1 + (off / width[:, None]) ** 2)
+        enough = number >= _FIT_SAMPLES / _EVERY
+        limits = np.where(enough, np.maximum(_LEAST_COUNTS, _SIGMAS * scatter), np.inf)
+        return cls(coefficients, limits, np.linalg.inv(normal))
+
+    def off(self, closing: _Closing) -> Array:
+        """By how much the counts are off, shape (n, 20)."""
+        return np.asarray(np.abs(closing.counts - np.einsum("nmk,mk->nm", closing.terms, self.coefficients)))
+
+    def leverage(self, closing: _Closing) -> Array:
+        """Standard deviation of what is foretold for counts that scatter by one, shape (n, 20)."""
+        return np.asarray(np.sqrt(np.einsum("nmk,mkl,nml->nm", closing.terms, self.spread, closing.terms)))
 
 
 def _runs(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -9,12 +9,13 @@ an object that it does not hold: usually little, but often far if a link above t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import hypot
 
 import numpy as np
 from gtsam import Pose2, Pose3, Rot3
 from numpy.typing import NDArray
 
-from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp
+from drivers.core.contacts import FINGERS, ApproachPath, Array, Contact, Grasp, StepSigma
 from drivers.core.poses import rotate, spatial, transform_points
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.collision_spheres import Verdicts, link_balls
@@ -36,6 +37,9 @@ SLIP_SIGMA_rad = float(np.deg2rad(10.0))
 
 NUDGE_SIGMA_m = 0.0005
 NUDGE_SIGMA_rad = float(np.deg2rad(0.5))
+FELT = StepSigma(0.0005, float(np.deg2rad(1.1)))
+"""How well odometry in the hand knows where a carried object lies, root mean square: results of ``carries``."""
+
 PUSH_SIGMA_m = 0.0046
 PUSH_SIGMA_rad = float(np.deg2rad(4.5))
 PUSHED_SHARE = 0.45
@@ -71,6 +75,7 @@ class KinematicHand:
         hand: its form, and the shape of its fingertips.
         yaw_window_rad: range of yaw of its arm.
         rng: all random numbers.
+        felt: how well its fingertips tell the motion of a carried object; None for a hand that knows its palm's only.
     """
 
     def __init__(
@@ -80,7 +85,9 @@ class KinematicHand:
         hand: HandShape,
         yaw_window_rad: tuple[float, float],
         rng: np.random.Generator,
+        felt: StepSigma | None = None,
     ) -> None:
+        self._felt, self._stated = felt, None if felt is None else _with_nudge(felt)
         self._solid, self._cycle, self._hand, self._window_rad, self._rng = solid, cycle, hand, yaw_window_rad, rng
         self._radius_m = hand.radius_m
         place = planar_pose(rng.normal(0.0, PLACE_SIGMA_m, 2), rng.uniform(-np.pi, np.pi))
@@ -102,7 +109,8 @@ class KinematicHand:
         contacts, lines = self._close(reached)
         palm = reached.frame.pose * table_of(reached, self._hand).grasp_T_palm
         stamp_ns = round(1e9 * self.elapsed_s)
-        grasp = Grasp(self._count, stamp_ns, (*contacts, *probed), palm, self._motion, lines)
+        sigma = None if self._was_left else self._stated
+        grasp = Grasp(self._count, stamp_ns, (*contacts, *probed), palm, self._motion, lines, sigma)
         self._count, self._motion = self._count + 1, Pose3()
         return Attempt(reached, landings, grasp)
 
@@ -110,7 +118,7 @@ class KinematicHand:
         """Turn and shift the object in the hand, with slip. Does nothing if it is not held, or is to be left in place.
 
         Returns:
-            The hand's motion in the world.
+            The object's motion in the world, as the hand knows it.
         """
         assert attempt.grasp is not None
         if not (wanted.moves and holds(attempt.grasp.touching)):
@@ -120,8 +128,12 @@ class KinematicHand:
         shift = np.append(wanted.shift_world_m, 0.0)
         turned = Rot3.Yaw(wanted.turn_rad)
         motion = Pose3(turned, about + shift - turned.rotate(about))
-        slip = self._stray(attempt.grasp.points_world_m.mean(axis=0), SLIP_SIGMA_m, SLIP_SIGMA_rad)
-        self.world_T_body, self._motion = motion * slip * self.world_T_body, motion
+        middle_m = attempt.grasp.points_world_m.mean(axis=0)
+        moved = motion * self._stray(middle_m, SLIP_SIGMA_m, SLIP_SIGMA_rad)
+        self.world_T_body = moved * self.world_T_body
+        if self._felt is not None:
+            motion = moved * self._stray(middle_m, self._felt.translation_m, self._felt.rotation_rad)
+        self._motion = motion
         cycle, way_m = self._cycle, float(np.linalg.norm(shift))
         self.elapsed_s += max(abs(wanted.turn_rad) / cycle.carry_turn_rad_s, way_m / cycle.carry_m_s) + cycle.rest_s
         return motion
@@ -228,6 +240,10 @@ class KinematicHand:
             moving &= ~touched & ~near
         return stops, touched
 
+    @property
+    def _was_left(self) -> bool:
+        return bool(self._motion.equals(Pose3(), 1e-9))
+
     # --- random effects -----------------------------------------------------------------------------------------
 
     def _beside(self, centres_world_m: Array) -> Array:
@@ -238,8 +254,7 @@ class KinematicHand:
 
     def _push(self, plan: GraspPlan) -> Pose3:
         """Move the object by the closing hand; the error of a carried object is in its slip."""
-        was_left = self._motion.equals(Pose3(), 1e-9)
-        far = was_left and self._links_meet(plan) and bool(self._rng.random() < PUSHED_SHARE)
+        far = self._was_left and self._links_meet(plan) and bool(self._rng.random() < PUSHED_SHARE)
         sigmas = (PUSH_SIGMA_m, PUSH_SIGMA_rad) if far else (NUDGE_SIGMA_m, NUDGE_SIGMA_rad)
         return self._stray(np.asarray(self.world_T_body.translation()), *sigmas)
 
@@ -260,3 +275,8 @@ class KinematicHand:
         """Distances of fingertips' centres (..., 3) to the surface."""
         flat = transform_points(self.world_T_body.inverse(), places_world_m.reshape(-1, 3))
         return self._solid.nearest(flat)[0].reshape(places_world_m.shape[:-1])
+
+
+def _with_nudge(felt: StepSigma) -> StepSigma:
+    """What is known of a carry, once the hand has closed again."""
+    return StepSigma(hypot(felt.translation_m, NUDGE_SIGMA_m), hypot(felt.rotation_rad, NUDGE_SIGMA_rad))

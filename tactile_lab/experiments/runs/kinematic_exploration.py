@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.core.contacts import StepSigma
 from drivers.shadow.closing.posture import HandShape
 from sessions.conductor.decisions import DoGrasp, Veto
 from sessions.conductor.estimator_client import LocalClient
@@ -19,7 +20,7 @@ from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.experiments.cells import Cell, Setting, grid
-from tactile_lab.experiments.data.kinematic_hand import KinematicHand
+from tactile_lab.experiments.data.kinematic_hand import FELT, KinematicHand
 from tactile_lab.experiments.data.solids import solid
 from tactile_lab.experiments.runs.coverage_monitor import CoverageMonitor, UntilExplored
 from tactile_lab.experiments.runs.hand_exploration import OBJECTS, RIG, conductor_settings, estimation
@@ -28,6 +29,8 @@ from tactile_lab.rigs.description import load_rig
 from tactile_lab.slam.tactile_slam import TactileSlam
 
 POLICIES = ("random", "clusters", "information")
+PALM, TOUCH = "palm", "touch"
+"""What tells how a carried object moved."""
 
 
 def settings(actions: int) -> list[Setting]:
@@ -35,8 +38,23 @@ def settings(actions: int) -> list[Setting]:
     return grid(object=list(OBJECTS), dimension=[2, 3], policy=list(POLICIES), actions=[actions])
 
 
+def felt_settings(actions: int) -> list[Setting]:
+    """The same with and without odometry in the hand."""
+    objects, policies = list(OBJECTS), ["random", "information"]
+    return grid(object=objects, dimension=[2, 3], policy=policies, actions=[actions], odometry=[PALM, TOUCH])
+
+
 def explore_by_kinematics(cell: Cell) -> dict[str, Any]:
     """One session. Cell: object, dimension, policy, actions."""
+    return _explore(cell, None)
+
+
+def explore_felt(cell: Cell) -> dict[str, Any]:
+    """The same. Cell: object, dimension, policy, actions, odometry."""
+    return _explore(cell, FELT if cell["odometry"] == TOUCH else None)
+
+
+def _explore(cell: Cell, felt: StepSigma | None) -> dict[str, Any]:
     rig, dimension, body = load_rig(RIG), int(cell["dimension"]), solid(cell["object"])
     slam, settings = estimation(rig, cell), conductor_settings(rig, cell)
     calibration = next(iter(force_tips(rig).values()))
@@ -45,7 +63,7 @@ def explore_by_kinematics(cell: Cell) -> dict[str, Any]:
     monitor = CoverageMonitor(body.mesh, slam, planner.known_shape, dimension, int(cell["actions"]))
     decisions = UntilExplored(LocalClient(SlamService(slam, planner)), monitor)
     rng = np.random.default_rng([cell.seed, 52183])
-    hand = KinematicHand(body, settings.cycle, shape, settings.plan.yaw_window_rad, rng)
+    hand = KinematicHand(body, settings.cycle, shape, settings.plan.yaw_window_rad, rng, felt)
     ending = _session(hand, decisions, planner, slam, monitor, settings)
     return {**monitor.figures(slam.finish()), "status": monitor.status(ending)}
 

@@ -78,3 +78,14 @@ EXPLORATION_KINEMATIC = Experiment(
     pooled=("object",),
     grasps=hand_exploration.ACTIONS,
 )
+
+EXPLORATION_FELT = Experiment(
+    "exploration-felt",
+    "Exploration without physics where the hand feels how a carried object moved, beside a hand that does not.",
+    kinematic_exploration.felt_settings,
+    kinematic_exploration.explore_felt,
+    HAND_COLUMNS,
+    ranges("odometry", "actions until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
+    pooled=("object",),
+    grasps=hand_exploration.ACTIONS,
+)

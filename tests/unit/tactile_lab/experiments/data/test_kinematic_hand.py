@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from gtsam import Pose2, Pose3
 
+from drivers.core.contacts import StepSigma
 from drivers.core.poses import spatial, transform_points
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
@@ -13,7 +14,7 @@ from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.planner import Reorientation
 from tactile_lab.experiments.cells import Cell
-from tactile_lab.experiments.data.kinematic_hand import KinematicHand
+from tactile_lab.experiments.data.kinematic_hand import FELT, KinematicHand
 from tactile_lab.experiments.data.solids import solid
 from tactile_lab.experiments.runs.kinematic_exploration import explore_by_kinematics
 
@@ -21,9 +22,9 @@ WINDOW_rad = (-1.31, 1.31)
 MIDDLE = GraspFrame(0.0, 0.0, 0.0)
 
 
-def hand(shape: str, place: Pose2, seed: int = 0) -> KinematicHand:
+def hand(shape: str, place: Pose2, seed: int = 0, felt: StepSigma | None = None) -> KinematicHand:
     body = solid(shape)
-    made = KinematicHand(body, CycleSettings(), HandShape(), WINDOW_rad, np.random.default_rng(seed))
+    made = KinematicHand(body, CycleSettings(), HandShape(), WINDOW_rad, np.random.default_rng(seed), felt)
     made.world_T_body = spatial(place, -body.foot_m)
     return made
 
@@ -76,6 +77,22 @@ def test_a_held_object_goes_with_the_hand_but_for_its_slip_and_the_next_grasp_kn
     following = own.attempt(GraspPlan(GraspFrame(0.03, 0.0, 0.5), "pinch", 0.028)).grasp
     assert following is not None
     assert following.hand_motion_world.equals(motion, 1e-12)
+
+
+def test_a_hand_that_feels_its_object_tells_the_slip_and_how_well_until_the_next_grasp() -> None:
+    own = hand("cube-6", Pose2(), felt=FELT)
+    attempt = own.attempt(GraspPlan(MIDDLE, "pinch", 0.028))
+    before = own.world_T_body
+    motion = own.carry(Reorientation(0.5, np.array([0.03, 0.0])), attempt)
+    off = np.asarray((motion * before).between(own.world_T_body).translation())
+    assert 0.0 < np.linalg.norm(off) < 0.002
+    frame = GraspFrame(0.03, 0.0, 0.5)
+    carried, left = (own.attempt(GraspPlan(frame, "pinch", 0.028)).grasp for _ in range(2))
+    assert carried is not None
+    assert left is not None
+    assert carried.motion_sigma is not None
+    assert carried.motion_sigma.translation_m == pytest.approx(0.0007, abs=1e-4)
+    assert left.motion_sigma is None
 
 
 def test_a_short_session_is_judged() -> None:

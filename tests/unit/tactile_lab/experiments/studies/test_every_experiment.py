@@ -55,6 +55,7 @@ TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "table-4.3": ({"tracking": ["joint"], "policy": ["det"]}, 5),
     "exploration-hand": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
     "exploration-kinematic": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"]}, 2),
+    "exploration-felt": ({"object": ["cube-6"], "dimension": ["2"], "policy": ["random"], "odometry": ["touch"]}, 2),
     "hands": ({"rig": ["sim-lite"]}, 1),
     "carries": ({"object": ["cube-6"], "mass_kg": ["0.3"]}, 2),
     "carried-3d": ({"object": ["cube-6"]}, 2),
