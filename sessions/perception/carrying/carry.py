@@ -190,7 +190,7 @@ class CarryOdometry:
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
         parts_m = [
             while_held_m,
-            noise.roll_m * held.loose * held.lean,
+            noise.roll_m * held.lean,
             noise.let_go_m_N * pressed_N,
             noise.pushed_m_N * pushed_N,
             noise.unseen * unseen[0],

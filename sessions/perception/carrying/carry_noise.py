@@ -35,7 +35,7 @@ class CarryNoise:
         spread_m, spread_rad: share of the differences between the answers of other assumptions about friction.
         slip_m, slip_rad: share of the slip itself.
         round_rad: share of the hand's turn that a round object may be off by, over the fingertips beyond two.
-        roll_m: how far a round object with sides that lean rolls when it is let go and grasped, over the sine.
+        roll_m: how far an object whose sides lean rolls or rocks when it is let go and grasped, over the sine.
         let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.

@@ -1,4 +1,4 @@
-"""How round a held object is: whether normals at its contacts show a turn, and whether it can roll.
+"""How round a held object is: whether normals at its contacts show a turn, and whether it may roll.
 
 Where all normals go through one axis, an object turns about it without any fingertip entering or leaving it. Then only
 friction at the fingertips turns it, and what the table takes from that is a guess.
@@ -31,13 +31,12 @@ class Roundness:
     """What the contacts of a carry show of the object.
 
     Attributes:
-        loose: 1 for an object whose turn no normal shows, towards 0 for one with corners; median of the steps.
-        turns: of each step the same over the fingertips beyond the two that any object needs, at least 0.4; 0 where
-            fewer than two held it. Shape (n,).
-        lean: sine of the angle by which its sides lean, at most 0.15.
+        turns: of each step 1 for an object whose turn no normal shows, towards 0 for one with corners, over the
+            fingertips beyond the two that any object needs, at least 0.4; 0 where fewer than two held it. Shape (n,).
+        lean: sine of the angle by which its sides lean, at most 0.15: what has no upright sides may have no flat
+            underside.
     """
 
-    loose: float
     turns: Array
     lean: float
 
@@ -47,10 +46,10 @@ class Roundness:
         spare = steps.felt.sum(axis=1) - _HELD_BY
         turns, held = np.zeros(len(steps)), spare >= 0
         if not held.any():
-            return cls(0.0, turns, 0.0)
+            return cls(turns, 0.0)
         loose = 1.0 / (1.0 + (_levers_m(balance.entering[held], balance.forces_N[held]) / _ROUND_m) ** 2)
         turns[held] = loose / np.maximum(spare[held], _LEAST_SPARE)
-        return cls(float(np.sort(loose)[len(loose) // 2]), turns, min(_lean(steps), _MOST_LEAN))
+        return cls(turns, min(_lean(steps), _MOST_LEAN))
 
 
 def _levers_m(entering: Array, forces_N: Array) -> Array:

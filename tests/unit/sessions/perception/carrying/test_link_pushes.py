@@ -132,6 +132,17 @@ def test_a_link_that_pushes_while_the_hand_opens_is_noticed_where_free_motors_ar
     assert links.opened_s(replace(pushed, motor_counts=None)) == 0.0
 
 
+def test_a_motor_that_stood_still_in_closings_tells_nothing_of_the_opening() -> None:
+    chance = np.random.default_rng(14)
+    links = LinkPushes(MOTORS, TIPS, "right")
+    for _ in range(2):
+        standing = closing(chance)
+        standing.joints_rad[:, JOINT_INDEX["RFJ3"]] = 0.3
+        links.pushed_s(standing)
+    assert links.opened_s(pushing(opening(chance), "RFJ3", 200.0)) == 0.0
+    assert links.opened_s(pushing(opening(chance), "FFJ3", 200.0)) == pytest.approx(0.5, abs=0.06)
+
+
 def test_the_place_is_less_certain_after_a_link_pushed_while_the_hand_opened() -> None:
     chance, before = np.random.default_rng(15), StepSigma(0.0003, 0.005)
     closed, opened = closing(chance), opening(chance)
