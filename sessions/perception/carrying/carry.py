@@ -30,6 +30,8 @@ _CLOSES_m_s = 0.008
 """Fingers that feel nothing go on closing this fast, and may push the object with a link."""
 _USUAL_NET_N, _PUSHED_SHARE = 0.8, 0.9
 """Net force with which objects are dragged over a table, and which quantile of a carry's is compared with it."""
+_FARTHER_THE_LONGER = 1.5
+"""Power of the time for which a link pushes: at first it slips along the object."""
 _SLIDES_m_s, _SLIDES_N = 0.010, 0.2
 """A fingertip that moves faster than this along the object, and presses more, counts as sliding."""
 _FARTHER, _TURNS_rad = 2.0, 0.005
@@ -131,7 +133,8 @@ class CarryOdometry:
             links: how long links pushed.
         """
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
-        causes = self._scale * np.array([excess_N, links.pushed_s, links.landed_s, float(links.opened_s > 0.0)])
+        pushed = links.pushed_s**_FARTHER_THE_LONGER
+        causes = self._scale * np.array([excess_N, pushed, links.landed_s, float(links.opened_s > 0.0)])
         translation_m = np.linalg.norm([sigma.translation_m, *causes * noise.after_m])
         rotation_rad = np.linalg.norm([sigma.rotation_rad, *causes * noise.after_rad])
         return StepSigma(float(translation_m), float(rotation_rad))

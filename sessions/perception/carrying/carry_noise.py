@@ -28,7 +28,8 @@ UNPUSHED = LinkTimes()
 
 @dataclass(frozen=True)
 class CarryNoise:
-    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83).
+    """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83,
+    121).
 
     Attributes:
         least_m, least_rad: of any carry.
@@ -40,29 +41,29 @@ class CarryNoise:
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
         closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
-        links_m_s, links_rad_s: for each second in which links pushed meanwhile.
+        links_m, links_rad: where links pushed for a second meanwhile; grows with the power 1.5 of that time.
         landed_m_s, landed_rad_s: for each second in which links were on the object when the hand came down before.
         opened_m, opened_rad: where links pushed while the hand opened.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
 
-    least_m: float = 0.00008
-    least_rad: float = float(np.deg2rad(0.04))
-    spread_m: float = 1.1
-    spread_rad: float = 0.2
-    slip_m: float = 0.019
-    slip_rad: float = 0.037
+    least_m: float = 0.0001
+    least_rad: float = float(np.deg2rad(0.1))
+    spread_m: float = 0.65
+    spread_rad: float = 0.19
+    slip_m: float = 0.0128
+    slip_rad: float = 0.05
     round_rad: float = 0.083
-    roll_m: float = 0.0045
+    roll_m: float = 0.0034
     let_go_m_N: float = 0.00006
     let_go_rad_N: float = float(np.deg2rad(0.07))
     pushed_m_N: float = 0.001
     pushed_rad_N: float = float(np.deg2rad(0.5))
     closed_m_N: float = 0.003
     closed_rad_N: float = float(np.deg2rad(1.9))
-    links_m_s: float = 0.0026
-    links_rad_s: float = float(np.deg2rad(3.0))
+    links_m: float = 0.0043
+    links_rad: float = float(np.deg2rad(3.1))
     landed_m_s: float = 0.007
     landed_rad_s: float = float(np.deg2rad(10.0))
     opened_m: float = 0.0008
@@ -72,9 +73,9 @@ class CarryNoise:
     @property
     def after_m(self) -> tuple[float, float, float, float]:
         """Of what happens once the hand lets go: net force, links that push, links that land, links while it opens."""
-        return self.closed_m_N, self.links_m_s, self.landed_m_s, self.opened_m
+        return self.closed_m_N, self.links_m, self.landed_m_s, self.opened_m
 
     @property
     def after_rad(self) -> tuple[float, float, float, float]:
         """The same of the turn."""
-        return self.closed_rad_N, self.links_rad_s, self.landed_rad_s, self.opened_rad
+        return self.closed_rad_N, self.links_rad, self.landed_rad_s, self.opened_rad

@@ -38,7 +38,7 @@ def test_a_disc_is_loose_and_a_box_is_not() -> None:
 
 def test_each_finger_that_holds_a_round_object_makes_its_turn_more_certain() -> None:
     sigmas_rad = [CarryOdometry({}, "right").carry(turned(DISC, count)).sigma.rotation_rad for count in (5, 4, 3)]
-    assert sigmas_rad[0] < 0.75 * sigmas_rad[1] < 0.5 * sigmas_rad[2]
+    assert sigmas_rad[0] < 0.8 * sigmas_rad[1] < 0.6 * sigmas_rad[2]
     assert sigmas_rad[2] > 0.05 * TURN.theta()
 
 
