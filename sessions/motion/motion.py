@@ -18,14 +18,13 @@ from drivers.positioner.positioner import mount_joints
 from drivers.shadow.closing.closing import Closing
 from drivers.shadow.closing.posture import TipEllipsoid
 from drivers.shadow.model.hand_form import HandForm
-from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm
+from sessions.motion.base_path import STRAIGHT_WRIST, base_path
 from sessions.motion.finger_targets import FingerTargets
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.safety import SafetySupervisor
 from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
-_STRAIGHT_WRIST = forearm_T_palm(np.zeros(len(JOINTS)))  # in the plane that a left hand is mirrored in
 _TARES = 5  # a fingertip that still swings is given so many rests
 _WITHDRAW_s = 0.15  # a positioner follows its targets late: back by more than it is behind
 _LEVEL_m = 0.001
@@ -166,7 +165,7 @@ class Motion:
         raised = Pose3(Rot3(), np.array([0.0, 0.0, above_m]))
         back = Pose3(Rot3(), -away_m * np.array(closing.approach))
         world_T_palm = raised * grasp.pose * back * closing.grasp_T_palm
-        mount_T_forearm = self.runtime.world_T_mount.inverse() * world_T_palm * _STRAIGHT_WRIST.inverse()
+        mount_T_forearm = self.runtime.world_T_mount.inverse() * world_T_palm * STRAIGHT_WRIST.inverse()
         return np.asarray(mount_joints(mount_T_forearm, float(self._base_q[3])))
 
     def set_base(self, q: Array) -> None:
@@ -175,11 +174,15 @@ class Motion:
         self.runtime.base.set_target(self._base_q)
 
     def move_base(self, q: Array, speed_m_s: float, turn_rad_s: float) -> None:
-        """Straight, smooth move of the positioner's joints to ``q``, shape (6,), limited by both speeds."""
-        start = self._base_q
+        """Smooth move of the positioner to joints ``q``, shape (6,), limited by both speeds (:func:`base_path`)."""
+        path = base_path(self._base_q, q, self._is_in_workspace)
         for share in self.shares(self._base_time_s(q, speed_m_s, turn_rad_s)):
-            self.set_base(start + smooth(share) * (q - start))
+            self.set_base(path(smooth(share)))
             self.tick()
+
+    def _is_in_workspace(self, palm_m: Array) -> bool:
+        x_m, y_m, _ = self.runtime.world_T_mount.transformFrom(palm_m)
+        return self.supervisor.is_well_inside(float(x_m), float(y_m))
 
     def rise(self, height_m: float, speed_m_s: float) -> None:
         """Move straight up from the positioner's last target."""

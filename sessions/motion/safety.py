@@ -82,6 +82,8 @@ class Stoppable(Protocol):
 
 
 _STOP_CYCLES = 5
+_SWAY_m = 0.005
+"""A positioner is so far off its targets as it sets off and stops."""
 
 
 class SafetySupervisor:
@@ -168,6 +170,10 @@ class SafetySupervisor:
             raise SafetyError(f"palm only {height_m * 1e3:.0f} mm above the table", where="base", hint="Lift the arm")
         if (out_m := self._from_centre_m(x_m, y_m)) > self.settings.workspace_radius_m:
             raise SafetyError(f"palm {out_m * 1e3:.0f} mm from the workspace centre", where="base", hint="Move it back")
+
+    def is_well_inside(self, x_m: float, y_m: float) -> bool:
+        """Whether the palm may go to world x, y: a little inside of the edge at which it is stopped."""
+        return self._from_centre_m(x_m, y_m) < self.settings.workspace_radius_m - _SWAY_m
 
     # --- between cycles ----------------------------------------------------------------------------------------
 

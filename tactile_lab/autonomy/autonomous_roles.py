@@ -99,7 +99,8 @@ def planner_for(slam: TactileSlam, settings: SessionSettings, hand: HandShape, s
 def side_reach(settings: SessionSettings) -> SideReach:
     """Where the palm may be beside an object."""
     safety = settings.safety
-    return SideReach(safety.workspace_radius_m, safety.workspace_centre_m, settings.cycle.standoff_m)
+    cycle = settings.cycle
+    return SideReach(safety.workspace_radius_m, safety.workspace_centre_m, cycle.standoff_m, cycle.touch.row_m)
 
 
 def hand_shape(runtime: RigRuntime) -> HandShape:

@@ -13,6 +13,9 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 
+_ROOM_m = 0.015
+"""The hand keeps so far inside of the workspace, whose edge stops it: it sways when it sets off and stops."""
+
 
 @dataclass(frozen=True)
 class SideReach:
@@ -22,19 +25,23 @@ class SideReach:
         radius_m: how far from ``centre_m``, world x, y.
         centre_m: of the workspace.
         standoff_m: how far before a grasp the hand comes down.
+        row_m: x of the fingertips in the grasp frame of a closing that only touches a side: the hand goes so far aside.
     """
 
     radius_m: float = 0.45
     centre_m: tuple[float, float] = (0.0, 0.0)
     standoff_m: float = 0.13
+    row_m: float = 0.0
 
     def holds(self, plan: GraspPlan, hand: HandShape) -> bool:
         """Whether the palm stays in the workspace, where the hand comes down beside the object too."""
         table = closing(plan.closing, plan.height_m, hand)
-        palm = np.asarray((plan.frame.pose * table.grasp_T_palm).translation())[:2]
+        frames = [place.frame.shifted_inside(np.array([-self.row_m, 0.0])) for place in plan.places] or [plan.frame]
+        palms = np.array([(frame.pose * table.grasp_T_palm).translation() for frame in frames])[:, :2]
         back_m = self.standoff_m * approach_of(plan, hand) if table.is_sideways else np.zeros(2)
-        places = np.array([palm, palm - back_m])
-        return bool(np.linalg.norm(places - np.array(self.centre_m), axis=1).max() < self.radius_m)
+        places = np.vstack([palms, palms - back_m])
+        out_m = float(np.linalg.norm(places - np.array(self.centre_m), axis=1).max())
+        return out_m < self.radius_m - _ROOM_m
 
 
 def approach_of(plan: GraspPlan, hand: HandShape) -> Array:
