@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from tactile_lab.experiments.cells import Cell
-from tactile_lab.experiments.experiment import Experiment
+from collections.abc import Callable
+
+from tactile_lab.experiments.cells import Cell, Setting
+from tactile_lab.experiments.experiment import Experiment, Work
 from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs import exploration_runs, hand_exploration, kinematic_exploration
 from tactile_lab.experiments.studies.columns import HAUSDORFF, REGISTRATION
@@ -57,35 +59,40 @@ TABLE_4_3 = Experiment(
     grasps=exploration_runs.MOST_GRASPS,
 )
 
-EXPLORATION_HAND = Experiment(
+
+def _by_the_hand(
+    name: str,
+    sentence: str,
+    settings: Callable[[int], list[Setting]],
+    run: Work,
+    by: str = "policy",
+) -> Experiment:
+    """An experiment whose candidates are the hand's own."""
+    label = "actions until 90 % is explored (definition A)"
+    plot = ranges(by, label, "actions_A", _hand_condition, columns=2)
+    return Experiment(
+        name, sentence, settings, run, HAND_COLUMNS, plot, pooled=("object",), grasps=hand_exploration.ACTIONS
+    )
+
+
+EXPLORATION_HAND = _by_the_hand(
     "exploration-hand",
     "The simulated hand's own candidates, 72 and more: actions until 90 % of an object is explored, by policy.",
     hand_exploration.settings,
     hand_exploration.explore_by_hand,
-    HAND_COLUMNS,
-    ranges("policy", "actions until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
-    pooled=("object",),
-    grasps=hand_exploration.ACTIONS,
 )
 
-EXPLORATION_KINEMATIC = Experiment(
+EXPLORATION_KINEMATIC = _by_the_hand(
     "exploration-kinematic",
     "The same candidates, policies and estimation without physics: kinematics on the true surface, measured noise.",
     kinematic_exploration.settings,
     kinematic_exploration.explore_by_kinematics,
-    HAND_COLUMNS,
-    ranges("policy", "actions until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
-    pooled=("object",),
-    grasps=hand_exploration.ACTIONS,
 )
 
-EXPLORATION_FELT = Experiment(
+EXPLORATION_FELT = _by_the_hand(
     "exploration-felt",
     "Exploration without physics where the hand feels how a carried object moved, beside a hand that does not.",
     kinematic_exploration.felt_settings,
     kinematic_exploration.explore_felt,
-    HAND_COLUMNS,
-    ranges("odometry", "actions until 90 % is explored (definition A)", "actions_A", _hand_condition, columns=2),
-    pooled=("object",),
-    grasps=hand_exploration.ACTIONS,
+    by="odometry",
 )
