@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tactile_lab.experiments.cells import Cell, Setting
-from tactile_lab.experiments.experiment import Experiment, Work
+from tactile_lab.experiments.cells import Cell, Setting, Work
+from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.runs import exploration_runs, hand_exploration, kinematic_exploration
 from tactile_lab.experiments.studies.columns import HAUSDORFF, REGISTRATION
