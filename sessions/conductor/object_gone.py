@@ -36,7 +36,7 @@ def blocked(approaches: int, landings_m: Sequence[Array]) -> str:
 
     Args:
         approaches: in a row that failed.
-        landings_m: where fingertips landed on the object, world, shape (3,) each.
+        landings_m: where it landed on the object, world, shape (3,) each.
     """
     said = f"could not reach the table: {approaches} approaches were blocked"
     if not len(landings_m):
@@ -44,7 +44,7 @@ def blocked(approaches: int, landings_m: Sequence[Array]) -> str:
     length_mm, width_mm = 1e3 * np.ptp(np.array(landings_m), axis=0)[:2]
     top_mm = 1e3 * max(float(place[2]) for place in landings_m)
     return (
-        f"{said}; fingertips landed over {length_mm:.0f} x {width_mm:.0f} mm, up to {top_mm:.0f} mm above the table, "
+        f"{said}; the hand landed over {length_mm:.0f} x {width_mm:.0f} mm, up to {top_mm:.0f} mm above the table, "
         f"while the open hand spans {1e3 * OPENING_m:.0f} mm. Turn the object or lay it on another side; with "
         "--dimension 3 wider objects are touched instead"
     )

@@ -89,6 +89,9 @@ class Planner:
         self._for_once = False
         """Whether it plans only one grasp or touch of an object that is otherwise grasped from above."""
 
+        self._outline_m = 0.0
+        """Where the hand had no room for an outline as low as it was planned: least height of its contacts now."""
+
         self._blocked, self._standstill, self._empty = 0, Standstill(), EmptyClosings()
         self.exhausted = ""
         """Why no action is left, in words; empty while there is one."""
@@ -116,7 +119,8 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, one grasp follows the
         contacts alone.
         """
-        return replace(self._next(index), may_rise=self._dimension == 3)
+        plan = self._next(index)
+        return replace(plan, height_m=max(plan.height_m, self._outline_m))
 
     def _next(self, index: int) -> GraspPlan:
         if (beside := self._beside(index)) is not None:
@@ -242,7 +246,7 @@ class Planner:
         """Forget what was known of an object that fell over."""
         self._object.is_outdated, self._standstill, self._landings_m = True, Standstill(), []
         self._standing, self._for_once, self._blocked, self._doubted = None, False, 0, False
-        self._empty = EmptyClosings()
+        self._empty, self._outline_m = EmptyClosings(), 0.0
         if self._chooser is not None:
             self._chooser.begin_anew()
         self.on_bounding_box(box)
@@ -285,6 +289,8 @@ class Planner:
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """Note a captured grasp. Returns how to carry the object now."""
         self._blocked = 0
+        if self._dimension == 2 and plan.height_m > max(self.settings.contour_heights_m):
+            self._outline_m = plan.height_m
         if self._standing is not None:
             self._standing.on_grasp(grasp)
             self._rule.centre_m = self._standing.middle_m

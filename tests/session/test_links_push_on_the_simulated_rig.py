@@ -37,7 +37,7 @@ def test_the_hand_comes_down_over_a_cube_of_6_cm_as_far_as_its_links_are_clear(h
     simulation = rig.description.simulation.model_copy(update={"object": "cube-6", "start": start})
     world = SimulatedWorld(simulation, 0)
     runtime = build_runtime(rig, world, Recorder(Forgetful()))
-    plan = GraspPlan(GraspFrame(0.0, 0.0, 0.0), "radial", height_m, may_rise=True)
+    plan = GraspPlan(GraspFrame(0.0, 0.0, 0.0), "radial", height_m)
     runtime.connect()
     try:
         motion = Motion(runtime, SafetySupervisor(runtime, SafetySettings(), runtime.cycle_ns))

@@ -42,7 +42,7 @@ def test_no_way_down_ends_the_session() -> None:
     watcher = Watcher()
     outcome = run(DiscWorld(disc(radius_m=0.2)), grasps=3, watcher=watcher)
     assert outcome.ending is Ending.OBJECT_LOST
-    assert outcome.reason.startswith("could not reach the table: 6 approaches were blocked; fingertips landed over ")
+    assert outcome.reason.startswith("could not reach the table: 6 approaches were blocked; the hand landed over ")
     assert outcome.grasps == ()
     assert watcher.messages[0] == "the hand landed on the object 4 times: trying another grasp"
 

@@ -34,7 +34,7 @@ def test_an_empty_table_tells_where_and_how_low_was_searched() -> None:
 
 def test_blocked_approaches_tell_how_wide_and_high_the_hand_landed() -> None:
     said = blocked(6, [np.array([-0.06, 0.0, 0.05]), np.array([0.06, 0.04, 0.07])])
-    assert said.startswith("could not reach the table: 6 approaches were blocked; fingertips landed over 120 x 40 mm")
+    assert said.startswith("could not reach the table: 6 approaches were blocked; the hand landed over 120 x 40 mm")
     assert "up to 70 mm above the table, while the open hand spans 105 mm" in said
 
 
