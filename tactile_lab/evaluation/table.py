@@ -57,15 +57,25 @@ def _shape_rows(first: Mapping[str, Any], best: Mapping[str, Any]) -> list[Evalu
 
 
 def _size_rows(extents: Sequence[Mapping[str, Any]]) -> list[EvaluationRow]:
+    told = [(str(extent["name"]).capitalize(), extent, *size_in_words(extent)) for extent in extents]
     return [
-        EvaluationRow(
-            str(extent["name"]).capitalize(),
-            f"{extent['mm']:.1f} \u00b1 {2 * extent['sigma_mm']:.1f}",
-            "mm",
-            f"with two standard deviations; true {_text(extent.get('true_mm'), 1)} mm",
-        )
-        for extent in extents
+        EvaluationRow(name, value, "mm", f"{note}; true {_text(extent.get('true_mm'), 1)} mm")
+        for name, extent, value, note in told
     ]
+
+
+def size_in_words(extent: Mapping[str, Any]) -> tuple[str, str]:
+    """An outer size of ``evaluation.json`` in millimetres, and what is known of it.
+
+    Touched at both ends it has its own uncertainty. Otherwise what is known is the touched span; the standard deviation
+    of a guess tells how far the model may be wrong where nobody felt, which is not how well the object is known.
+    """
+    if not extent.get("is_guess"):
+        return f"{extent['mm']:.1f} \u00b1 {2 * extent['sigma_mm']:.1f}", "two standard deviations"
+    if extent["touched_mm"] is None:
+        return f"\u2248 {extent['mm']:.1f}", "a guess, not touched"
+    touched = f"{extent['touched_mm']:.1f} \u00b1 {2 * extent['touched_sigma_mm']:.1f} mm"
+    return f"\u2248 {extent['mm']:.1f}", f"touched over {touched}, beyond is a guess"
 
 
 def _pose_rows(pose: Mapping[str, Any]) -> list[EvaluationRow]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sessions.perception.weighing.object_properties import Value
-from tactile_lab.evaluation.table import UNKNOWN
+from tactile_lab.evaluation.table import UNKNOWN, size_in_words
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent, Surface
 from tactile_lab.report.legend import legend
@@ -89,16 +89,15 @@ def key_figures(content: ReportContent) -> Markup:
 
 
 def _size_tiles(extents: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str, str]]:
-    """Estimated dimensions with two standard deviations, and the true ones below."""
-    return [
-        (
-            str(extent["name"]).capitalize(),
-            f"{extent['mm']:.1f} \u00b1 {2 * extent['sigma_mm']:.1f}",
-            "mm",
-            "two standard deviations" if extent.get("true_mm") is None else f"true {extent['true_mm']:.1f} mm",
-        )
-        for extent in extents
-    ]
+    """Estimated dimensions with two standard deviations, and below them the true ones or what is only a guess."""
+    return [(str(extent["name"]).capitalize(), *_size_tile(extent)) for extent in extents]
+
+
+def _size_tile(extent: Mapping[str, Any]) -> tuple[str, str, str]:
+    value, note = size_in_words(extent)
+    true = "" if extent.get("true_mm") is None else f"true {extent['true_mm']:.1f} mm"
+    told = [note, true] if extent.get("is_guess") else [true or note]
+    return value, "mm", "; ".join(words for words in told if words)
 
 
 def _mass_tile(mass_kg: Value | None) -> list[tuple[str, str, str, str]]:

@@ -1,8 +1,13 @@
-"""The outer size of a shape with its uncertainty, as somebody with a caliper would measure it."""
+"""The outer size of a shape with its uncertainty, as somebody with a caliper would measure it.
+
+A jaw of the caliper lies on a place that was touched, or on one that is a guess. Touched at both ends a size is as
+certain as those places. Otherwise only the span of what was touched is known, and the size is the model's opinion.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,33 +27,55 @@ _JAW_m = 0.0005
 """Points this close to the outermost one touch a caliper's jaw too; their standard deviations are averaged."""
 
 
-def unknown_sizes(shape: Contour | SurfaceMesh | None) -> list[Doubt]:
-    """A doubt where an end of the shape is a guess: most of a surface may be known, and yet not how long it is.
+@dataclass(frozen=True)
+class Span:
+    """A distance between two ends with its standard deviation, metres, the errors of both being independent."""
 
-    An end that was touched anywhere is as certain as there, whatever its rim is.
+    length_m: float
+    sigma_m: float
+
+
+@dataclass(frozen=True)
+class Size:
+    """One outer dimension of a shape.
+
+    Attributes:
+        whole: of all of it. An end that was touched anywhere is as certain as there, whatever its rim is.
+        touched: between the outermost places that were touched; None if nothing was.
+        is_guess: whether an end was touched nowhere.
     """
+
+    whole: Span
+    touched: Span | None
+    is_guess: bool
+
+
+def unknown_sizes(shape: Contour | SurfaceMesh | None) -> list[Doubt]:
+    """A doubt where an end of the shape is a guess: most of a surface may be known, and yet not how long it is."""
     if shape is None:
         return []
     points_m = shape.points_m if isinstance(shape, Contour) else shape.vertices
-    unknown = [
-        f"{name} {1e3 * size:.0f} ± {1e3 * sigma:.0f} mm"
-        for name, (size, sigma) in zip(SIDES, sizes(points_m, shape.sigma_m, shape.known), strict=False)
-        if sigma > LARGEST_SIGMA_m
-    ]
+    found = zip(SIDES, sizes(points_m, shape.sigma_m, shape.known), strict=False)
+    unknown = [_in_words(name, size) for name, size in found if size.whole.sigma_m > LARGEST_SIGMA_m]
     if not unknown:
         return []
     return [Doubt("unknown-size", f"an end of it was not touched: {', '.join(unknown)}", grave=False)]
 
 
-def sizes(
-    points_m: Array, sigma_m: Array | None = None, known: NDArray[np.bool_] | None = None
-) -> Sequence[tuple[float, float]]:
-    """Length, width and, of points in space, height, each with its standard deviation, metres.
+def _in_words(name: str, size: Size) -> str:
+    told = f"{name} {1e3 * size.whole.length_m:.0f} ± {1e3 * size.whole.sigma_m:.0f} mm"
+    if size.touched is None or not size.is_guess:
+        return told
+    return f"{told} (touched over {1e3 * size.touched.length_m:.0f} mm)"
+
+
+def sizes(points_m: Array, sigma_m: Array | None = None, known: NDArray[np.bool_] | None = None) -> Sequence[Size]:
+    """Length, width and, of points in space, height.
 
     Args:
         points_m: of an outline, shape (n, 2), or a surface, shape (n, 3).
         sigma_m: their standard deviations, shape (n,); none by default.
-        known: which of them were touched, shape (n,), and count where an end has any; all alike by default.
+        known: which of them were touched, shape (n,); all by default.
     """
     sigma_m = np.zeros(len(points_m)) if sigma_m is None else sigma_m
     known = np.ones(len(points_m), dtype=bool) if known is None else known
@@ -72,8 +99,18 @@ def _rectangle(points_m: Array) -> tuple[Array, Array]:
     return (along[best], across[best]) if longer_first else (across[best], along[best])
 
 
-def _size(places_m: Array, sigma_m: Array, known: NDArray[np.bool_]) -> tuple[float, float]:
-    low, high = float(places_m.min()), float(places_m.max())
-    jaws = places_m <= low + _JAW_m, places_m >= high - _JAW_m
-    felt = [jaw & known if (jaw & known).any() else jaw for jaw in jaws]
-    return high - low, float(np.hypot(*(sigma_m[jaw].mean() for jaw in felt)))
+def _size(places_m: Array, sigma_m: Array, known: NDArray[np.bool_]) -> Size:
+    jaws = _jaws(places_m)
+    felt = [jaw & known for jaw in jaws]
+    ends = [touched if touched.any() else jaw for touched, jaw in zip(felt, jaws, strict=True)]
+    touched = _span(places_m[known], sigma_m[known], _jaws(places_m[known])) if known.any() else None
+    return Size(_span(places_m, sigma_m, ends), touched, not all(jaw.any() for jaw in felt))
+
+
+def _jaws(places_m: Array) -> list[NDArray[np.bool_]]:
+    """Which places along a line each jaw of the caliper touches."""
+    return [places_m <= places_m.min() + _JAW_m, places_m >= places_m.max() - _JAW_m]
+
+
+def _span(places_m: Array, sigma_m: Array, ends: list[NDArray[np.bool_]]) -> Span:
+    return Span(float(np.ptp(places_m)), float(np.hypot(*(sigma_m[end].mean() for end in ends))))

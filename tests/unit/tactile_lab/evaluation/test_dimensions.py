@@ -19,8 +19,10 @@ TURN = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
 RECTANGLE = np.array([[0.05, 0.03], [-0.05, 0.03], [-0.05, -0.03], [0.05, -0.03]]) @ TURN.T
 
 
-def estimated(folder: Path, ring_m: Array, sigma_m: Array, truth_m: Array | None) -> EstimateWithTruth:
-    (folder / "contour.csv").write_text(contour_text(ring_m, sigma_m))
+def estimated(
+    folder: Path, ring_m: Array, sigma_m: Array, truth_m: Array | None, known: Array | None = None
+) -> EstimateWithTruth:
+    (folder / "contour.csv").write_text(contour_text(ring_m, sigma_m, known))
     results = Results(Trajectory((0.0,), (Pose3(),)), (), {"dimension": 2}, ())
     return EstimateWithTruth(folder, results, Truth((Pose3(),), outline_m=truth_m))
 
@@ -34,6 +36,16 @@ def test_a_turned_rectangle_is_measured_along_its_sides(tmp_path: Path) -> None:
     assert (length.mm, width.mm) == pytest.approx((100.0, 60.0))
     assert (length.true_mm, width.true_mm) == pytest.approx((110.0, 66.0))
     assert width.sigma_mm == pytest.approx(np.hypot(1.0, 0.2))
+
+
+def test_what_the_files_say_of_touched_places_is_heard(tmp_path: Path) -> None:
+    known, sigma_m = np.array([True, False, False, True]), np.array([0.0004, 0.040, 0.040, 0.0004])
+    found = dimensions(estimated(tmp_path, RECTANGLE, sigma_m, None, known))
+    assert found is not None
+    length, width = found
+    assert (length.is_guess, width.is_guess) == (True, False)
+    assert width.sigma_mm == pytest.approx(np.hypot(0.4, 0.4))
+    assert (length.touched_mm, width.touched_mm) == pytest.approx((0.0, 60.0))
 
 
 def test_without_truth_only_the_estimate_is_known_and_without_a_shape_nothing(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tactile_lab.evaluation.table import evaluation_rows, further_text
+from tactile_lab.evaluation.table import evaluation_rows, further_text, size_in_words
 
 EVALUATION: dict[str, Any] = {
     "shape": {
@@ -52,7 +52,7 @@ SAID = {
     "F-score at 1 mm": ("0.765", "", "0.876 at best fit; share of both surfaces within 1 mm"),
     "F-score at 2 mm": ("\u2013", "", "\u2013 at best fit; share of both surfaces within 2 mm"),
     "Overlap": ("0.912", "", "\u2013 at best fit; intersection over union"),
-    "Width": ("60.2 \u00b1 0.6", "mm", "with two standard deviations; true 60.0 mm"),
+    "Width": ("60.2 \u00b1 0.6", "mm", "two standard deviations; true 60.0 mm"),
     "Position error": ("1.23", "mm", "RMS; 2.34 at the end, 0.45 between grasps, drift 0.13 per grasp"),
     "Rotation error": ("2.01", "\u00b0", "RMS; 3.33 at the end, 0.11 between grasps, drift 0.22 per grasp"),
     "Aligned position error": (
@@ -85,6 +85,14 @@ def test_every_figure_is_said_with_its_digits_its_unit_and_what_it_is_of() -> No
     value, unit, _ = rows.pop("Registration error")
     assert (value, unit) == ("0.88", "mm")
     assert rows == SAID
+
+
+def test_of_a_size_with_a_guessed_end_only_the_touched_span_has_an_uncertainty() -> None:
+    guess = {"name": "length", "mm": 121.21, "sigma_mm": 40.0, "is_guess": True}
+    touched = size_in_words(guess | {"touched_mm": 104.04, "touched_sigma_mm": 1.71})
+    assert touched == ("\u2248 121.2", "touched over 104.0 \u00b1 3.4 mm, beyond is a guess")
+    untouched = size_in_words(guess | {"touched_mm": None, "touched_sigma_mm": None})
+    assert untouched == ("\u2248 121.2", "a guess, not touched")
 
 
 def test_what_is_unknown_is_a_dash_without_a_unit() -> None:
