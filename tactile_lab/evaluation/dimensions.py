@@ -49,8 +49,15 @@ def dimensions(estimate: EstimateWithTruth) -> tuple[Extent, ...] | None:
 
 def _extent(name: str, size: Size, true_mm: float | None) -> Extent:
     whole, touched = size.whole, size.touched
-    known_mm = (None, None) if touched is None else (1e3 * touched.length_m, 1e3 * touched.sigma_m)
-    return Extent(name, 1e3 * whole.length_m, 1e3 * whole.sigma_m, *known_mm, size.is_guess, true_mm)
+    return Extent(
+        name,
+        mm=1e3 * whole.length_m,
+        sigma_mm=1e3 * whole.sigma_m,
+        touched_mm=None if touched is None else 1e3 * touched.length_m,
+        touched_sigma_mm=None if touched is None else 1e3 * touched.sigma_m,
+        is_guess=size.is_guess,
+        true_mm=true_mm,
+    )
 
 
 def _estimated(estimate: EstimateWithTruth) -> tuple[Array, Array, NDArray[np.bool_]] | None:
