@@ -27,7 +27,7 @@ from sessions.perception.carrying.net_wrench import upward_N
 from sessions.perception.carrying.vibration import HeardSlip, SlipHearing, VibratingFingertip
 from sessions.perception.contact_world import MountUncertainty
 from sessions.perception.event_outcomes import Outcome, TareReport, TruthFrame, Undone
-from sessions.perception.hand_odometry import HandOdometry
+from sessions.perception.hand_odometry import HandMotion, HandOdometry
 from sessions.perception.hand_placement import HandPlacement
 from sessions.perception.instruments import (
     BaseReading,
@@ -75,6 +75,8 @@ class Perception:
         tip_surfaces: of the fingertips whose approach paths are computed, by finger.
         form: of the hand.
         motors: which motor pulls which joint; without it links that push stay unnoticed.
+        stays: an object that the hand does not hold stays where it is, but for what the hand feels; False where people
+            move it, too.
     """
 
     def __init__(
@@ -89,7 +91,9 @@ class Perception:
         settings: PerceptionSettings | None = None,
         form: HandForm = RIGHT_HAND,
         motors: MotorMap | None = None,
+        stays: bool = True,
     ) -> None:
+        self._stays = stays
         self.form, self.motors = form, motors
         """Which hand it is, and which motor pulls which joint; None if that is not known."""
         self._wrench = dict(wrench_fingertips or {})
@@ -303,14 +307,15 @@ class Perception:
             world_T_palm=Pose3(measured.world_T_palm),
             hand_motion_world=motion.world if index else Pose3(),
             approach_paths=(*measured.ways, *probed.ways),
-            motion_sigma=self._motion_sigma(index, motion.sigma),
+            motion_sigma=self._motion_sigma(index, motion),
             begins_anew=index in self._unheld[EventKind.OBJECT_FELL],
         )
 
-    def _motion_sigma(self, index: int, felt: StepSigma | None) -> StepSigma | None:
+    def _motion_sigma(self, index: int, motion: HandMotion) -> StepSigma | None:
         if index in self._unheld[EventKind.OBJECT_MOVED]:
             return _PUSHED
-        return self.held.then_closed(felt) if index else None
+        stood = self.held.stood if self._stays else None
+        return self.held.then_closed(stood if motion.is_rest else motion.sigma) if index else None
 
     def _truth_frame(self) -> TruthFrame | None:
         frame, self._frame = self._frame, None

@@ -138,6 +138,7 @@ def build_interpreter(rig: Rig) -> Interpreter:
         settings=description.perception,
         form=form,
         motors=MotorMap.load(rig.files["motors"]),
+        stays=description.motion.unheld < 1,
     )
     return Interpreter(
         perception,

@@ -124,6 +124,11 @@ class CarryOdometry:
         half_width_m = min(max(half_m, _LEAST_HALF_WIDTH_m), _LARGEST_HALF_WIDTH_m)
         return self.measured.known(Friction(half_width_m=half_width_m))
 
+    @property
+    def stood(self) -> StepSigma:
+        """How far an object may have moved that stood while it was touched."""
+        return StepSigma(self._scale * self.noise.stood_m, self._scale * self.noise.stood_rad)
+
     def closed(self, sigma: StepSigma, closing_N: float, links: LinkTimes = UNPUSHED) -> StepSigma:
         """How well the object's place is known once the hand has closed again.
 

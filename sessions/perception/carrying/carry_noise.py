@@ -44,6 +44,7 @@ class CarryNoise:
         links_m, links_rad: where links pushed for a second meanwhile; grows with the power 1.5 of that time.
         landed_m_s, landed_rad_s: for each second in which links were on the object when the hand came down before.
         opened_m, opened_rad: where links pushed while the hand opened.
+        stood_m, stood_rad: of an object that was not carried, by touches and closings that should not move it.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
@@ -68,6 +69,8 @@ class CarryNoise:
     landed_rad_s: float = float(np.deg2rad(10.0))
     opened_m: float = 0.0008
     opened_rad: float = float(np.deg2rad(1.0))
+    stood_m: float = 0.00025
+    stood_rad: float = float(np.deg2rad(0.3))
     unseen: float = 0.5
 
     @property

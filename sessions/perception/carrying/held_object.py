@@ -164,6 +164,13 @@ class HeldObject:
         samples = self._record.since(stamp_ns)
         return None if samples is None else slip(samples, self.fingertips, self._side, self.odometry.friction)
 
+    @property
+    def stood(self) -> StepSigma | None:
+        """How far an object that nobody carried may have moved, before the hand closed around it; None where pushes
+        are not felt: without fingertips that measure them, or without motors that tell of links.
+        """
+        return self.odometry.stood if self.fingertips and self._links is not None else None
+
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
         pushes = LinkTimes(self.pushed_s, self.landed_s, self.opened_s)

@@ -7,6 +7,7 @@ along the normals meet, improved by the evidence of the profile.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -90,12 +91,12 @@ class Turned:
         start_m, sigma_m = find_axis(contacts, largest_gap_rad)
         if misfit_around(contacts, start_m)[0] > _LARGEST_MISFIT:
             raise ShapeError("the contacts' normals do not meet one vertical axis")
-        axis_m = _likeliest_axis(gpis, contacts, start_m)
+        axis_m, spread_m = _likeliest_axis(gpis, contacts, start_m)
         half = _half(gpis.settings, contacts, axis_m).optimise(max_iterations=_KERNEL_STEPS)
         price = 2 * np.log(_AXIS_RANGE_m / (np.sqrt(2 * np.pi) * sigma_m))
         evidence = half.log_marginal_likelihood() + misfit_around(contacts, axis_m)[1] - price
         free_m = np.empty((0, 3)) if free_points_m is None else np.reshape(free_points_m, (-1, 3))
-        return cls(axis_m, sigma_m, half, to_profile(free_m, axis_m), floor_m, float(evidence))
+        return cls(axis_m, min(spread_m, sigma_m), half, to_profile(free_m, axis_m), floor_m, float(evidence))
 
     @cached_property
     def profile(self) -> Gpis:
@@ -138,8 +139,10 @@ class Turned:
         return SurfaceMesh(vertices_m, turned.triangles, sigma_m, normals, is_closed=section.is_closed)
 
 
-def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> Array:
-    """The axis of largest evidence, with the kernel that is best for the first guess."""
+def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> tuple[Array, float]:
+    """The axis of largest evidence, shape (2,), with the kernel that is best for the first guess; and its standard
+    deviation along each direction, by the curvature there.
+    """
     kernel = _half(gpis.settings, contacts, start_m).optimise(max_iterations=_KERNEL_STEPS).kernel.log_parameters
 
     def cost(axis_m: Array) -> float:
@@ -158,7 +161,19 @@ def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> A
             "maxfev": _AXIS_TRIES,
         },
     )
-    return np.asarray(found.x)
+    return np.asarray(found.x), _spread_m(cost, found.x)
+
+
+def _spread_m(cost: Callable[[Array], float], axis_m: Array) -> float:
+    """Root mean square of the standard deviations of an axis with this cost; infinite if it is no minimum."""
+    x, y = _AXIS_STEP_m * np.eye(2)
+    here, aside = cost(axis_m), [cost(axis_m + step) + cost(axis_m - step) for step in (x, y, x + y)]
+    along = np.array(aside[:2]) - 2 * here
+    across = (aside[2] - 2 * here - along.sum()) / 2
+    determinant = along.prod() - across**2
+    if along.min() <= 0 or determinant <= 0:
+        return np.inf
+    return float(_AXIS_STEP_m * np.sqrt(along.mean() / determinant))
 
 
 def _half(settings: GpisSettings, contacts: WeightedContacts, axis_m: Array) -> Gpis:

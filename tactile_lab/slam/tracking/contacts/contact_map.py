@@ -88,7 +88,8 @@ class PlacedGrasp:
 
     def was_left(self, noise: MotionNoise) -> bool:
         """Whether the hand left the object in place before, and it is therefore expected to move less."""
-        return self.motion_sigma is None and noise.after(self.motion) != noise
+        expected = noise.after(self.motion, self.motion_sigma)
+        return not self.motion.any() and expected.translation_m < noise.translation_m
 
     def put_aside(self) -> PlacedGrasp:
         """The same grasp with none of its contacts in the shape."""
