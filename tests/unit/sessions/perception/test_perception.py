@@ -8,6 +8,8 @@ from drivers.core.contacts import FINGERS
 from drivers.core.errors import DeviceError, SessionError
 from drivers.core.fingertip import TipContact
 from drivers.shadow.model.kinematics import JOINTS, forearm_T_palm, palm_T_distal, palm_T_distal_matrices
+from drivers.simulation.calibration import SimulatedCalibration
+from sessions.perception.carrying.carry_noise import CarryNoise
 from sessions.perception.contact_world import HandGeometry, MountUncertainty
 from sessions.perception.event_outcomes import TareReport, TruthFrame
 from sessions.perception.perception import PerceptionSettings
@@ -294,6 +296,42 @@ def test_marks_survive_their_written_form():
 def test_foreign_marks_are_refused(data):
     with pytest.raises(SessionError, match="mark"):
         SessionEvent.from_bytes(data)
+
+
+class FeelingTip(FakeTip):
+    """A fingertip that feels while it moves; nothing."""
+
+    drift = np.zeros(6)
+
+    def reading(self):
+        return np.zeros(6)
+
+    def touches(self, readings, world_R_distal):
+        raise AssertionError("no carry asks for its contacts")
+
+    def wrenches(self, readings, world_R_distal):
+        return np.zeros((len(readings), 6))
+
+
+def second_grasp(carried=False, **options):
+    perception = make_perception(**options)
+    hear(perception)
+    grasp(perception)
+    if carried:
+        tell(perception, EventKind.HOLD_BEGIN)
+        hear(perception, base_q=1.1 * BASE_q)
+        tell(perception, EventKind.HOLD_END)
+    return grasp(perception)
+
+
+def test_what_stood_where_pushes_are_felt_has_a_noise_of_its_own():
+    motors = SimulatedCalibration.from_package().motors
+    stood = second_grasp(tip=FeelingTip, motors=motors).motion_sigma
+    assert (stood.translation_m, stood.rotation_rad) == (CarryNoise.stood_m, CarryNoise.stood_rad)
+    assert second_grasp(tip=FeelingTip, motors=motors, carried=True).motion_sigma is None
+    assert second_grasp(tip=FeelingTip, motors=motors, stays=False).motion_sigma is None
+    assert second_grasp(tip=FeelingTip).motion_sigma is None
+    assert second_grasp(motors=motors).motion_sigma is None
 
 
 class ShakenTip(FakeTip):

@@ -162,6 +162,23 @@ def test_rule_stands_in_where_nothing_is_known_or_all_is_lost(slam: KnownSlam) -
     assert planner(slam).plan(5).reason == "alternating yaw"
 
 
+def test_an_outline_is_felt_where_the_hand_had_room_from_then_on() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9)
+    plan = chooser.plan(0)
+    raised = plan.raised(0.0121, np.inf)
+    assert raised is not None
+    assert raised.height_m == pytest.approx(plan.height_m + 0.013)
+    chooser.on_grasp(grasp_at("FF", "TH"), raised)
+    assert {chooser.plan(index).height_m for index in range(1, 5)} == {raised.height_m}
+
+
+def test_a_surface_is_felt_at_all_heights_whatever_was_raised() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9, dimension=3)
+    raised = replace(chooser.plan(0), height_m=0.047)
+    chooser.on_grasp(grasp_at("FF", "TH"), raised)
+    assert min(chooser.plan(index).height_m for index in range(1, 5)) < 0.047
+
+
 def test_estimate_is_carried_with_the_hand() -> None:
     chooser = planner(known_slam())
     chooser.on_carry(Pose3(Rot3(), np.array([0.1, 0.0, 0.0])))
