@@ -104,7 +104,8 @@ def grasp_section(content: ReportContent) -> Markup:
     picture = figures.force_map(content)
     parts = [element("h2", "Grasps")]
     if picture is not None:
-        parts.append(figure(picture, "In newtons; a dashed cell is a finger that did not touch.", "Contact forces"))
+        readable = element("div", Markup(picture), class_="scroll broad")
+        parts.append(figure(readable, "In newtons; a dashed cell is a finger that did not touch.", "Contact forces"))
     rows = [_grasp_row(content, index) for index in range(len(content.results.contacts))]
     titles = ["grasp", "time, s", "contacts", "verdict", "reason", "σ, mm", "σ, °", "error, mm", "error, °"]
     note = "σ is the estimated standard deviation of position and heading; the error is relative to the marker camera."

@@ -34,6 +34,10 @@ def figure(picture: str, caption: str, heading: str = "", *extra: Markup) -> Mar
     return element("figure", *head, *extra, Markup(picture), element("figcaption", caption), class_="card")
 
 
+_LONG = 24
+"""Letters from which on a cell of text keeps a width to be read in, and the table scrolls where the page has none."""
+
+
 def table(head: Sequence[str], rows: Iterable[Sequence[str | Markup]], text_columns: Iterable[int] = (0,)) -> Markup:
     """A table whose first column names the row; ``text_columns`` are left-aligned."""
     left = set(text_columns)
@@ -46,7 +50,8 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str | Markup]], text_colu
 
 
 def _cell(content: str | Markup, attributes: dict[str, str]) -> Markup:
-    return element("td", content, **attributes)
+    is_long = attributes and not isinstance(content, Markup) and len(content) > _LONG
+    return element("td", content, **({"class_": "text long"} if is_long else attributes))
 
 
 def badge(text: str, kind: str) -> Markup:

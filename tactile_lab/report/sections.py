@@ -180,11 +180,17 @@ def _surface_card(content: ReportContent, surface: Surface) -> Markup:
         element("div", *map(_still, stills, (view.name for view in VIEWS)), class_="stills"),
         _controls(content),
         _scale(surface.sigma_m),
-        element("figcaption", "Drag to turn, wheel to zoom. The file mesh.ply holds σ at every vertex."),
+        element(
+            "figcaption", f"{_grey(surface)}Drag to turn, wheel to zoom. The file mesh.ply holds σ at every vertex."
+        ),
         Markup(f'<script type="application/json" id="viewer-data">{data}</script>'),
         class_="card",
         id="viewer",
     )
+
+
+def _grey(surface: Surface) -> str:
+    return "" if np.isfinite(surface.sigma_m).all() else "Grey is a guess: nothing was touched near it. "
 
 
 def _still(address: str, name: str) -> Markup:

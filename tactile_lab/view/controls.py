@@ -28,6 +28,10 @@ BUTTONS: tuple[tuple[Ask, str, IconName, str], ...] = (
     (Ask.PAUSE, "Pause / resume", Icon.PLAYER_PAUSE, "Pause all motion until pressed again"),
     (Ask.END, "End", Icon.PLAYER_STOP, "End the session; press twice"),
 )
+GREY, GREEN, AMBER, RED = (73, 80, 87), (26, 127, 55), (138, 90, 0), (200, 34, 44)
+"""Of buttons: white words on them have a contrast of five to one and more."""
+
+_BUTTON_COLOURS = {Ask.END: RED, Ask.PAUSE: AMBER, Ask.CAPTURE: GREEN}
 _ROWS = 8
 _MOST_TOLD = 3
 """Doubts and alternatives that the panel has room for; the report has all."""
@@ -38,7 +42,7 @@ PANEL_STYLE = "padding:0 0.9em 0.6em 0.9em;font-size:0.85em;line-height:1.45"
 
 
 class Controls:
-    """Draws the panel.
+    """Draws the panel: what to do and how it stands, the buttons, and what is known besides.
 
     Args:
         server: the page.
@@ -52,6 +56,7 @@ class Controls:
             for ask, label, icon, hint in BUTTONS:
                 self._button(server, ask, label, icon, hint, press)
             self._note(server, press)
+        self._details = server.gui.add_html("")
         self._history = server.gui.add_html("")
         self._plots = Plots(server)
 
@@ -64,13 +69,12 @@ class Controls:
         hint: str,
         press: Press,
     ) -> None:
-        colour: Any = {Ask.END: "red", Ask.PAUSE: "yellow", Ask.CAPTURE: "green"}.get(ask, "gray")
-        button = server.gui.add_button(label, hint=hint, icon=icon, color=colour)
+        button = server.gui.add_button(label, hint=hint, icon=icon, color=_BUTTON_COLOURS.get(ask, GREY))
         button.on_click(lambda event: press(ask, ""))
 
     def _note(self, server: viser.ViserServer, press: Press) -> None:
         text: Any = server.gui.add_text("Note", "")
-        button = server.gui.add_button("Save note", icon=Icon.PENCIL, color="gray")
+        button = server.gui.add_button("Save note", icon=Icon.PENCIL, color=GREY)
 
         def keep(event: viser.GuiEvent[Any]) -> None:
             note, text.value = text.value, ""
@@ -85,21 +89,26 @@ class Controls:
     def draw(self, scene: Scene) -> None:
         """Update the panel."""
         self._status.content = status_html(scene)
+        self._details.content = details_html(scene)
         self._history.content = history_html(scene)
         self._plots.draw(scene)
 
 
 def status_html(scene: Scene) -> str:
-    """The state of the session in a few lines."""
+    """What to do and how it stands, in a few lines, so that the buttons below are in sight on a small screen too."""
     guide, parts = scene.guide, []
     if guide.get("paused"):
-        parts.append(banner(f"Paused: {guide['paused']}", "#b7791f"))
+        parts.append(banner(f"Paused: {guide['paused']}", "#8a5a00"))
     if guide:
         parts.append(line_html(f"Grasp {guide.get('grasp', '')}: {guide.get('stage', '')}", "font-weight:600"))
         parts.append(line_html(str(guide.get("prompt", "")), "font-size:1.15em;font-weight:600;color:#1f6feb"))
-        parts.append(line_html(str(guide.get("capture", "")), "color:#57606a"))
-    parts.append(trust_html(scene))
-    parts.append(forces_html(scene))
+        parts.append(line_html(str(guide.get("capture", "")), "color:#57606a;margin-bottom:0.4em"))
+    return _panel([*parts, _trust(scene), forces_html(scene)])
+
+
+def details_html(scene: Scene) -> str:
+    """Why the estimate is doubted, what else it may be, and what is known of the session."""
+    guide = scene.guide
     facts = [
         ("pose", _pose(scene)),
         ("explored", "" if scene.surface is None else f"{scene.surface.explored:.0%} of the surface is known"),
@@ -108,23 +117,32 @@ def status_html(scene: Scene) -> str:
         ("last", scene.messages[-1] if scene.messages else ""),
         ("not shown", f"{scene.dropped} messages: the page was slower than the session" if scene.dropped else ""),
     ]
-    parts += [_fact(name, value) for name, value in facts if value]
-    if scene.surface is not None:
-        parts.append(_scale())
+    told = [_fact(name, value) for name, value in facts if value]
+    return _panel([*_reasons(scene), *told, "" if scene.surface is None else _scale()])
+
+
+def _panel(parts: list[str]) -> str:
     return f'<div style="{PANEL_STYLE}">{"".join(parts)}</div>'
 
 
-def trust_html(scene: Scene) -> str:
-    """How far to trust the estimate: its status, and each doubt and alternative on a line; empty if unknown."""
+def _trust(scene: Scene) -> str:
+    """How far to trust the estimate; empty if unknown."""
     told = scene.trust
     if not told:
         return ""
     status, share = str(told.get("status", "")), told.get("known_share")
     touched = "" if share is None else f", {share:.0%} of the shape touched"
-    parts = [banner(f"{status.capitalize()}{touched}", _STATUS_COLOURS.get(status, "#57606a"))]
-    parts += [line_html(f"• {words}", "") for words in told.get("doubts", [])[:_MOST_TOLD]]
-    parts += [line_html(f"or {words}", "color:#57606a") for words in told.get("alternatives", [])[:_MOST_TOLD]]
-    return "".join(parts)
+    return banner(f"{status.capitalize()}{touched}", _STATUS_COLOURS.get(status, "#57606a"))
+
+
+def _reasons(scene: Scene) -> list[str]:
+    """Each doubt and each alternative on a line."""
+    told = scene.trust
+    doubts = [line_html(f"• {words}", "") for words in told.get("doubts", [])[:_MOST_TOLD]]
+    return [
+        *doubts,
+        *(line_html(f"or {words}", "color:#57606a") for words in told.get("alternatives", [])[:_MOST_TOLD]),
+    ]
 
 
 def forces_html(scene: Scene) -> str:

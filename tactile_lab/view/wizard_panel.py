@@ -9,7 +9,7 @@ from typing import Any
 import viser
 from viser import Icon
 
-from tactile_lab.view.controls import PANEL_STYLE, banner, forces_html, line_html
+from tactile_lab.view.controls import GREEN, GREY, PANEL_STYLE, RED, banner, forces_html, line_html
 from tactile_lab.view.scene import Scene
 
 Answer = Callable[[int, str], None]
@@ -33,7 +33,7 @@ class WizardPanel:
         self._server, self._answer = server, answer
         self._head = server.gui.add_html("", order=_HEAD)
         hint = "Quit; nothing is stored"
-        leave = server.gui.add_button("Quit", hint=hint, icon=Icon.PLAYER_STOP, color="red", order=_QUIT)
+        leave = server.gui.add_button("Quit", hint=hint, icon=Icon.PLAYER_STOP, color=RED, order=_QUIT)
         leave.on_click(lambda event: answer(0, quit_key))
         self._told = server.gui.add_html("", order=_TOLD)
         self._shown: tuple[int, int] = (0, 0)
@@ -55,7 +55,7 @@ class WizardPanel:
 
     def _button(self, question: dict[str, Any], place: int) -> Any:
         key, meaning = question["answers"][place]
-        colour: Any = "green" if key == question["usual"] else "gray"
+        colour = GREEN if key == question["usual"] else GREY
         button = self._server.gui.add_button(meaning.capitalize(), color=colour, order=_BUTTONS + place)
         button.on_click(lambda event: self._answer(int(question["number"]), key))
         return button

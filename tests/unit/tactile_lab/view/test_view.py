@@ -32,7 +32,7 @@ from sessions.recording.traffic import schemas
 from tactile_lab import process_feed
 from tactile_lab.cli.running.page_address import PageAddress
 from tactile_lab.process_feed import QUEUE_LENGTH
-from tactile_lab.view.controls import history_html, status_html
+from tactile_lab.view.controls import details_html, history_html, status_html
 from tactile_lab.view.drawing import patches
 from tactile_lab.view.feed import ViewFeed
 from tactile_lab.view.gate import Gate, Head, is_loopback, new_token, parse_head
@@ -123,7 +123,7 @@ def test_panel_tells_prompt_pause_pose_and_grasps_and_shows_no_foreign_markup() 
     text = status_html(scene)
     assert "Move &lt;the&gt; hand" in text
     assert "Paused: coffee" in text
-    assert "10, 0 mm, 6°" in text
+    assert "10, 0 mm, 6°" in details_html(scene)
     assert "TH silent" in text
     assert history_html(scene).count("tracked: contacts placed to 1 mm") == 2
 
@@ -161,12 +161,12 @@ def test_the_panel_says_what_may_be_believed_of_the_newest_estimate_only() -> No
         "alternatives": ["grasp 2 turned by 60° and moved by 30 mm (12%)"],
     }
     recorder.slam(1, Pose3(), {"index": 0, **trust}, np.eye(3))
-    shown = status_html(sink.scene)
+    shown = status_html(sink.scene) + details_html(sink.scene)
     assert "Ambiguous, 62% of the shape touched" in shown
     assert "&lt;improbable&gt;" in shown
     assert "turned by 60°" in shown
     recorder.slam(2, Pose3(), {"index": 1, "status": "complete", "known_share": None}, np.eye(3))
-    shown = status_html(sink.scene)
+    shown = status_html(sink.scene) + details_html(sink.scene)
     assert "Complete<" in shown
     assert "improbable" not in shown
     recorder.slam(3, Pose3(), {"index": 2}, np.eye(3))
