@@ -135,10 +135,16 @@ def _of_study(study: Experiment, rows: Sequence[Row], grasps: int | None) -> lis
 
 
 def _store(docs: Path, study: Experiment, part: Part, forget: bool) -> None:
-    from tactile_lab.cli.console import say
-    from tactile_lab.experiments.results.storing import store
+    from tactile_lab.cli.console import say, warn
+    from tactile_lab.experiments.results.storing import partial_rows, store
 
+    partial = [] if forget else partial_rows(docs, study.name, part)
     say(f"stored  {store(docs, study.name, study.sentence, part, forget=forget)}")
+    if partial:
+        warn(
+            f"the older row stays for {'; '.join(partial)}: it is of more {' and '.join(study.pooled)}s together than "
+            "these runs. Add the runs of the others with --merge FOLDER, or drop what is older with --forget"
+        )
     _write_pages(docs)
 
 

@@ -19,7 +19,7 @@ from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Group, group_runs
 from tactile_lab.experiments.plots import draw
 from tactile_lab.experiments.results.pages import page
-from tactile_lab.experiments.results.stored_result import MadeBy, Part, StoredResult, Table
+from tactile_lab.experiments.results.stored_result import TOGETHER, MadeBy, Part, StoredResult, Table
 from tactile_lab.experiments.runner import FORMAT
 from tactile_lab.experiments.studies.plots import UNITS
 from tactile_lab.experiments.summary import group_json, table
@@ -62,7 +62,7 @@ def part_of(study: Experiment, rows: Sequence[Row], jobs: int, command: str, gra
     tables = [_table(study, group_runs(rows), names)]
     if pooled := pooled_groups(study, rows):
         left = [name for name in names if name not in study.pooled]
-        together = f"All values of {' and '.join(study.pooled)} together"
+        together = f"{TOGETHER}{' and '.join(study.pooled)} together"
         tables.insert(0, _table(study, pooled, left, together))
         if study.kind is not None:
             kinds = pooled_groups(study, [_of_kind(row, study.kind(row.cell)) for row in rows])

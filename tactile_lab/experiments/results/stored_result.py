@@ -20,6 +20,8 @@ from tactile_lab.experiments.plot_data import Plot
 from tactile_lab.experiments.results.page_ages import ASK
 
 FORMAT = "tactile-result/1"
+TOGETHER = "All values of "
+"""Begins the title of a table whose rows stand for several rows of the last table each."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,11 @@ class Table:
     def key(self, row: Sequence[str]) -> tuple[str, ...]:
         """The texts that identify a row."""
         return tuple(row[: self.keys])
+
+    @property
+    def is_pooled(self) -> bool:
+        """Whether each row stands for several rows of the part's last table."""
+        return self.title.startswith(TOGETHER)
 
     def without(self, other: Table) -> Table:
         """The rows that the other table does not have; all of them if it is about something else."""

@@ -16,7 +16,7 @@ from tactile_lab.experiments.results.claims import Goal, Panel, Place, find, jud
 from tactile_lab.experiments.results.page_ages import CURRENT, OLDER, answer, answer_overview
 from tactile_lab.experiments.results.pages import merge_plots, page
 from tactile_lab.experiments.results.stored_result import MadeBy, Part, StoredResult, Table
-from tactile_lab.experiments.results.storing import combine, store
+from tactile_lab.experiments.results.storing import combine, partial_rows, store
 
 HEAD = ("method", "shape", "runs", "Hausdorff, mm", "failed")
 POOLED = Table(
@@ -76,6 +76,32 @@ def test_rows_replace_those_of_the_same_settings_that_told_something_else() -> N
 def test_tables_with_other_columns_stay() -> None:
     older = replace(made(OLD, ("joint", "L")), tables=(POOLED,))
     assert combine(made(NOW, ("joint", "L")), (older,))[1].tables == (POOLED,)
+
+
+def together(by: MadeBy, *rows: tuple[str, str]) -> Part:
+    """A part with a row for each method, of all its shapes."""
+    part = made(by, *rows)
+    methods = {method: sum(one == method for one, _ in rows) for method, _ in rows}
+    pooled = tuple((method, str(count)) for method, count in methods.items())
+    return replace(part, tables=(Table("All values of shape together", ("method", "runs"), pooled), *part.tables))
+
+
+def test_a_row_of_all_shapes_is_replaced_only_by_one_of_as_many(tmp_path: Path) -> None:
+    older = together(OLD, ("joint", "L"), ("joint", "U"), ("icp", "L"), ("icp", "U"))
+    some = together(NOW, ("joint", "L"), ("joint", "U"), ("icp", "L"))
+    new, left = combine(some, (older,))
+    assert new.tables[0].rows == (("joint", "2"),)
+    assert [table.rows for table in left.tables] == [(("icp", "2"),), (("icp", "U", "2", "0.1.0", "0"),)]
+    more = together(NOW, ("joint", "L"), ("joint", "U"), ("joint", "O"))
+    assert combine(more, (older,))[0].tables[0].rows == (("joint", "3"),)
+    later = replace(NOW, sources="bbbb")
+    rest = combine(together(later, ("icp", "U")), combine(some, (older,)))
+    assert [row for part in rest for row in part.tables[0].rows if len(row) == 2] == [("joint", "2"), ("icp", "2")]
+    assert rest[0].tables[0].title == ""
+    (tmp_path / "results" / "data").mkdir(parents=True)
+    assert partial_rows(tmp_path, "test", some) == []
+    store(tmp_path, "test", "s.", older)
+    assert partial_rows(tmp_path, "test", some) == ["icp"]
 
 
 def test_commands_of_the_same_version_are_collected() -> None:
