@@ -131,12 +131,19 @@ class Gpis:
         sigmas = seen.value_sigma_m[kept], seen.gradient_sigma[kept]
         return self.refit(self.contacts_m[kept], self.normals[kept], *sigmas)
 
-    def refit(self, points_m: Array, normals: Array, point_sigma_m: Array, normal_sigma_rad: Array) -> Self:
+    def refit(
+        self,
+        points_m: Array,
+        normals: Array,
+        point_sigma_m: Array,
+        normal_sigma_rad: Array,
+        noise_scale: float = 1.0,
+    ) -> Self:
         """The field of other contacts with the same kernel; arguments and errors as of :meth:`fit`."""
         check_contacts(points_m, normals, point_sigma_m, normal_sigma_rad)
         observations = observe(points_m, normals, point_sigma_m, normal_sigma_rad, self.settings)
         prior = prior_mean(points_m, normals, self.settings)
-        return self._again(points_m, normals, observations, self.kernel, prior)
+        return self._again(points_m, normals, observations, self.kernel, prior, noise_scale)
 
     def optimise(
         self, *, noise: bool = False, max_iterations: int = 30, longest_m: float = _LENGTH_BOUNDS_m[1]

@@ -19,7 +19,7 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.solids.axis import find_axis, misfit_around
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
-from tactile_lab.slam.shape.solids.turned import Turned
+from tactile_lab.slam.shape.solids.turned import Turned, half_like, rough_half
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
 _LARGEST_GAP_rad = np.deg2rad(220.0)
@@ -55,8 +55,7 @@ class Lying:
         """Fit heading, axis and profile to the contacts of a field; arguments and errors as of :meth:`Turned.fit`."""
         contacts = contacts_of(gpis)
         heading_rad = _heading_rad(contacts)
-        rough = _turned(gpis, _seen_along(heading_rad), None)
-        along = _seen_along(_likeliest_rad(contacts, heading_rad, rough))
+        along = _seen_along(_likeliest_rad(gpis, contacts, heading_rad))
         body = _turned(gpis, along, free_points_m)
         sigma_rad = float(contacts.normal_weights.sum() ** -0.5)
         price = np.log(np.pi / (np.sqrt(2 * np.pi) * sigma_rad))
@@ -95,16 +94,20 @@ def _misfit(heading_rad: float, contacts: WeightedContacts) -> float:
         return np.inf
 
 
-def _likeliest_rad(contacts: WeightedContacts, heading_rad: float, rough: Turned) -> float:
-    """The heading of largest evidence near another one, about the middle of the axis found with that."""
-    middle_m = np.append(rough.axis_m, rough.half.contacts_m[:, 1].mean()) @ _seen_along(heading_rad)
-    everything = np.ones(len(contacts), dtype=bool)
+def _likeliest_rad(gpis: Gpis, contacts: WeightedContacts, heading_rad: float) -> float:
+    """The heading of largest evidence near another one, about the middle of the axis found with that.
+
+    Raises:
+        ShapeError: the contacts do not surround an axis there, or their normals do not meet it.
+    """
+    start = _seen_along(heading_rad)
+    rough, axis_m = rough_half(gpis.settings, _rotated(contacts, start), _LARGEST_GAP_rad)
+    middle_m = np.append(axis_m, rough.contacts_m[:, 1].mean()) @ start
 
     def cost(turned_rad: float) -> float:
         along = _seen_along(heading_rad + turned_rad)
         seen, axis_m = _rotated(contacts, along), (along @ middle_m)[:2]
-        half = replace(rough, axis_m=axis_m).half_of(seen, everything)
-        return -half.log_marginal_likelihood() - misfit_around(seen, axis_m)[1]
+        return -half_like(rough, seen, axis_m).log_marginal_likelihood() - misfit_around(seen, axis_m)[1]
 
     limits = -float(_SEARCHED_rad), float(_SEARCHED_rad)
     found = minimize_scalar(cost, bounds=limits, method="bounded", options={"xatol": float(_TOLERANCE_rad)})

@@ -88,9 +88,7 @@ class Turned:
             ShapeError: the contacts are in the plane, do not surround an axis, or their normals do not meet it.
         """
         contacts = contacts_of(gpis)
-        start_m, sigma_m = find_axis(contacts, largest_gap_rad)
-        if misfit_around(contacts, start_m)[0] > _LARGEST_MISFIT:
-            raise ShapeError("the contacts' normals do not meet one vertical axis")
+        start_m, sigma_m = _met_axis(contacts, largest_gap_rad)
         axis_m, spread_m = _likeliest_axis(gpis, contacts, start_m)
         half = _half(gpis.settings, contacts, axis_m).optimise(max_iterations=_KERNEL_STEPS)
         price = 2 * np.log(_AXIS_RANGE_m / (np.sqrt(2 * np.pi) * sigma_m))
@@ -108,7 +106,7 @@ class Turned:
     def half_of(self, contacts: WeightedContacts, chosen: NDArray[np.bool_]) -> Gpis:
         """The field of the profile of some contacts in space, about this axis and with this kernel."""
         some = WeightedContacts(*(each[chosen] for each in vars(contacts).values()))
-        return _like(self.half, _half(self.half.settings, some, self.axis_m))
+        return half_like(self.half, some, self.axis_m)
 
     def predict(self, points_m: Array) -> Prediction:
         """The field of the profile, with its gradient, at points of shape (q, 3)."""
@@ -143,10 +141,10 @@ def _likeliest_axis(gpis: Gpis, contacts: WeightedContacts, start_m: Array) -> t
     """The axis of largest evidence, shape (2,), with the kernel that is best for the first guess; and its standard
     deviation along each direction, by the curvature there.
     """
-    kernel = _half(gpis.settings, contacts, start_m).optimise(max_iterations=_KERNEL_STEPS).kernel.log_parameters
+    best = _half(gpis.settings, contacts, start_m).optimise(max_iterations=_KERNEL_STEPS)
 
     def cost(axis_m: Array) -> float:
-        half = _half(gpis.settings, contacts, axis_m).with_log_parameters(kernel)
+        half = half_like(best, contacts, axis_m)
         return -half.log_marginal_likelihood() - misfit_around(contacts, axis_m)[1]
 
     simplex = start_m + _AXIS_STEP_m * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -176,12 +174,42 @@ def _spread_m(cost: Callable[[Array], float], axis_m: Array) -> float:
     return float(_AXIS_STEP_m * np.sqrt(along.mean() / determinant))
 
 
+def rough_half(
+    settings: GpisSettings, contacts: WeightedContacts, largest_gap_rad: float = LARGEST_GAP_rad
+) -> tuple[Gpis, Array]:
+    """The profile with its best kernel and noise about the axis that normals alone tell, and that axis, shape (2,).
+
+    Raises:
+        ShapeError: as :meth:`Turned.fit`.
+    """
+    axis_m, _ = _met_axis(contacts, largest_gap_rad)
+    return _half(settings, contacts, axis_m).optimise(noise=True, max_iterations=_KERNEL_STEPS), axis_m
+
+
+def half_like(half: Gpis, contacts: WeightedContacts, axis_m: Array) -> Gpis:
+    """The profile of other contacts or about another axis, with the kernel and the noise of one."""
+    return half.refit(*_seen_from(contacts, axis_m), half.noise_scale)
+
+
+def _met_axis(contacts: WeightedContacts, largest_gap_rad: float) -> tuple[Array, float]:
+    """As :func:`find_axis`. Raises ShapeError also if the normals do not meet it."""
+    axis_m, sigma_m = find_axis(contacts, largest_gap_rad)
+    if misfit_around(contacts, axis_m)[0] > _LARGEST_MISFIT:
+        raise ShapeError("the contacts' normals do not meet one vertical axis")
+    return axis_m, sigma_m
+
+
 def _half(settings: GpisSettings, contacts: WeightedContacts, axis_m: Array) -> Gpis:
     """The field of the profile from the contacts, all at positive distances."""
+    return Gpis.fit(*_seen_from(contacts, axis_m), settings)
+
+
+def _seen_from(contacts: WeightedContacts, axis_m: Array) -> tuple[Array, Array, Array, Array]:
+    """Places and normals of contacts in planes through an axis, shape (n, 2), and their standard deviations."""
     normals, _ = split(contacts, axis_m)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     sigmas = contacts.point_weights**-0.5, contacts.normal_weights**-0.5
-    return Gpis.fit(to_profile(contacts.points_m, axis_m), normals, *sigmas, settings)
+    return to_profile(contacts.points_m, axis_m), normals, *sigmas
 
 
 def _both_halves(half: Gpis, floor_m: float | None) -> Gpis:
@@ -190,13 +218,7 @@ def _both_halves(half: Gpis, floor_m: float | None) -> Gpis:
     rows = np.column_stack([half.contacts_m, half.normals, seen.value_sigma_m, seen.gradient_sigma])
     right = rows if floor_m is None else np.vstack([rows, *_below_table(rows, floor_m)])
     both = np.vstack([right, right * [-1, 1, -1, 1, 1, 1]])
-    section = Gpis.fit(both[:, :2], both[:, 2:4], both[:, 4], both[:, 5], half.settings)
-    return _like(half, section)
-
-
-def _like(half: Gpis, other: Gpis) -> Gpis:
-    """Another field with the kernel and the noise of a profile's."""
-    return other.with_log_parameters(np.append(half.kernel.log_parameters, np.log(half.noise_scale)))
+    return half.refit(both[:, :2], both[:, 2:4], both[:, 4], both[:, 5], half.noise_scale)
 
 
 def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:
