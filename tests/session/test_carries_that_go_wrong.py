@@ -17,12 +17,14 @@ from sessions.perception.carrying.carry import Carry
 from sessions.perception.interpreter import HAND_LINK
 from tactile_lab.experiments.data.spoilt_samples import AS_MEASURED
 from tactile_lab.experiments.runs import carried_objects
-from tactile_lab.experiments.runs.carried_objects import CarryWatch, WatchedCarry, watch_carries
+from tactile_lab.experiments.runs.carried_objects import CarryWatch, MASS_kg, WatchedCarry, watch_carries
 from tests.support.low_rig import BRISK_WAY, low_rig
 
 SEED = 5
 SOON, LATER = 20, 30
 """Cycles after the beginning of the carry."""
+LIGHT_kg, HIGH_m = 0.1, 0.010
+"""An object that the hand can lift, and how high above the table it is dropped."""
 
 Interfere = Callable[[Plant, int], None]
 
@@ -34,16 +36,25 @@ def brisk_way(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def carry_with(
-    interfere: Interfere, monkeypatch: pytest.MonkeyPatch, shape: str = "box-10x6x4", seed: int = SEED
+    interfere: Interfere,
+    monkeypatch: pytest.MonkeyPatch,
+    shape: str = "box-10x6x4",
+    seed: int = SEED,
+    lifts: bool = False,
 ) -> tuple[SessionOutcome, CarryWatch]:
-    """A session of two grasps; something happens in each cycle of the carry between them."""
+    """A session of two grasps; something happens in each cycle of the carry between them; or a light object
+    is lifted to be weighed meanwhile.
+    """
+    during = "weigh" if lifts else "re-orient"
 
     class Interfering(CarryWatch):
         cycles: int | None = None
 
         def phase(self, number: int, name: str) -> None:
             super().phase(number, name)
-            self.cycles = 0 if name == "re-orient" else None
+            self.cycles = 0 if name == during else None
+            if name == during == "weigh":
+                self._palm_before, self._carried = self._runtime.perception.hand.world_T_palm, (0, {})
             self._world.plant._data.xfrc_applied[:] = 0.0
 
         def on_sample(self, link: str, sample: object) -> None:
@@ -53,7 +64,7 @@ def carry_with(
                 interfere(self._world.plant, self.cycles)
 
     monkeypatch.setattr(carried_objects, "CarryWatch", Interfering)
-    return watch_carries(shape, seed, grasps=2)
+    return watch_carries(shape, seed, 2, LIGHT_kg if lifts else MASS_kg, int(lifts))
 
 
 def only_carry(outcome: SessionOutcome, watch: CarryWatch) -> tuple[WatchedCarry, Carry]:
@@ -125,6 +136,24 @@ def test_what_happens_to_the_object_is_told_and_the_noise_holds_it(
     outcome, watch = carry_with(interfere, monkeypatch, shape, seed)
     found, felt = only_carry(outcome, watch)
     assert any(words in told for told in watch.told)
+    assert np.abs(sigmas_off(found, felt)).max() < 3.0
+
+
+def test_an_object_that_is_dropped_from_a_height_is_told_and_the_noise_holds_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    heights_m: list[float] = []
+
+    def drop(plant: Plant, cycle: int) -> None:
+        heights_m.append(float(plant._data.xpos[plant._object, 2]))
+        if heights_m[-1] > heights_m[0] + HIGH_m:
+            lift_off(plant, set(FINGERS))
+
+    outcome, watch = carry_with(drop, monkeypatch, lifts=True)
+    found, felt = only_carry(outcome, watch)
+    assert max(heights_m) > heights_m[0] + HIGH_m
+    assert any("it slipped out of the fingers" in told for told in watch.told)
+    assert any("dropped from 10 mm" in told for told in watch.told)
     assert np.abs(sigmas_off(found, felt)).max() < 3.0
 
 

@@ -14,7 +14,7 @@ from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_noise import UNPUSHED, CarryNoise, LinkTimes
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, MeasuredFriction, compose_steps
-from sessions.perception.carrying.lifted import lifted_motions, raised
+from sessions.perception.carrying.lifted import dropped_m, lifted_motions, raised
 from sessions.perception.carrying.planar_motions import displacements, planar_matrices
 from sessions.perception.carrying.resistance import Resistance
 from sessions.perception.carrying.roundness import Roundness
@@ -54,6 +54,7 @@ class Carry:
         single_s: how long only one did.
         resisted_N: force with which the object resisted, beyond what a table's friction explains; 0 if it did not.
         tilted_rad: how far it leaned at the end; 0 if it stood.
+        dropped_m: how high above where it was grasped it was lost; 0 if it was not lost up there.
         void: fingertips without valid readings for a while.
         sliding: ratio of tangential to normal force at contacts that slid, shape (n,).
     """
@@ -67,6 +68,7 @@ class Carry:
     resisted_N: float
     void: tuple[str, ...]
     tilted_rad: float = 0.0
+    dropped_m: float = 0.0
     sliding: Array = field(default_factory=lambda: np.zeros(0))
 
     def in_words(self) -> str:
@@ -87,6 +89,8 @@ class Carry:
             found.append(f"held by one fingertip for {self.single_s:.1f} s")
         if self.loose_s > _NO_HOLD_s:
             found.append(f"touched by no fingertip for {self.loose_s:.1f} s")
+        if self.dropped_m:
+            found.append(f"dropped from {1e3 * self.dropped_m:.0f} mm")
         if self.tilted_rad:
             found.append(f"the object leans by {np.degrees(self.tilted_rad):.0f} degrees: has it fallen over?")
         if self.resisted_N:
@@ -162,7 +166,7 @@ class CarryOdometry:
         ends = displacements(motions, middle)
         slip = displacements(np.linalg.inv(palm) @ motions[0], middle)
         loose_s, single_s = (float(steps.step_s @ (steps.felt.sum(axis=1) == count)) for count in (0, 1))
-        tilted_rad, resistance = tilt_rad(steps), Resistance.of(steps, usual)
+        tilted_rad, fell_m, resistance = tilt_rad(steps), dropped_m(steps), Resistance.of(steps, usual)
         void_s = steps.step_s @ (steps.is_void & [finger in self._fingertips for finger in FINGERS])
         return Carry(
             motion=_pose(motions[0]),
@@ -171,7 +175,8 @@ class CarryOdometry:
                 slip,
                 steps,
                 balance,
-                self._unseen(steps, balance.centres_m, tilted_rad, resistance.doubt) + _squeezed_out(steps, best),
+                self._unseen(steps, balance.centres_m, tilted_rad, fell_m, resistance.doubt)
+                + _squeezed_out(steps, best),
             ),
             slip_m=float(np.hypot(*slip[:2])),
             slip_rad=float(abs(slip[2])),
@@ -179,16 +184,19 @@ class CarryOdometry:
             single_s=single_s,
             resisted_N=resistance.resisted_N,
             tilted_rad=tilted_rad,
+            dropped_m=fell_m,
             void=tuple(finger for finger, seconds in zip(FINGERS, void_s, strict=True) if seconds > _NO_HOLD_s),
             sliding=_sliding_ratios(steps, balance.sliding_m(best)),
         )
 
-    def _unseen(self, steps: TipSteps, centres_m: Array, tilted_rad: float, doubt: Array) -> Array:
-        """Motion that was not seen, metres and radians: of the hand in doubtful steps, and of what tips over."""
+    def _unseen(self, steps: TipSteps, centres_m: Array, tilted_rad: float, fell_m: float, doubt: Array) -> Array:
+        """Motion that was not seen, metres and radians: of the hand in doubtful steps, of what tips over, and of what
+        falls, which may go as far aside as down.
+        """
         unseen_m, unseen_rad = _unseen(steps, centres_m, self._fingertips, doubt)
         half_m, closing_m = self.friction.half_width_m, _CLOSES_m_s * float(steps.step_s @ (steps.felt.sum(axis=1) < 2))
-        turned_rad = unseen_rad + closing_m / half_m + tilted_rad
-        return np.array([unseen_m + closing_m + 2 * half_m * tilted_rad, turned_rad])
+        turned_rad = unseen_rad + (closing_m + fell_m) / half_m + tilted_rad
+        return np.array([unseen_m + closing_m + fell_m + 2 * half_m * tilted_rad, turned_rad])
 
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
         noise, held = self.noise, Roundness.of(steps, balance)

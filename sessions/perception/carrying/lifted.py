@@ -13,19 +13,28 @@ from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from sessions.perception.carrying.friction_balance import Friction, TIP_CREEP_m_s
-from sessions.perception.carrying.tip_steps import TipSteps
+from sessions.perception.carrying.tip_steps import HELD_BY, RAISED_m, TipSteps
 
-_RAISED_m = 0.001
 _ITERATIONS = 12
-_HELD_BY = 2
 _LEAST_WEIGHT = np.diag([1e-3, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6])
 
 
 def raised(steps: TipSteps) -> NDArray[np.bool_]:
     """Steps in which the hand is higher than where it grasped and two fingertips hold, shape (n,)."""
     heights_m = steps.world_T_palm[:, 2, 3]
-    higher = np.maximum(heights_m[1:], heights_m[:-1]) > heights_m[0] + _RAISED_m
-    return np.asarray(higher & (steps.felt.sum(axis=1) >= _HELD_BY))
+    higher = np.maximum(heights_m[1:], heights_m[:-1]) > heights_m[0] + RAISED_m
+    return np.asarray(higher & (steps.felt.sum(axis=1) >= HELD_BY))
+
+
+def dropped_m(steps: TipSteps) -> float:
+    """How high the hand was above where it grasped when the fingertips lost the object for good, m; 0 if they did not
+    lose it up there.
+    """
+    held = np.flatnonzero(steps.felt.sum(axis=1) >= HELD_BY)
+    if not len(held) or held[-1] == len(steps) - 1:
+        return 0.0
+    higher_m = float(steps.world_T_palm[held[-1] + 1, 2, 3] - steps.world_T_palm[0, 2, 3])
+    return higher_m if higher_m > RAISED_m else 0.0
 
 
 def lifted_motions(steps: TipSteps, chosen: NDArray[np.bool_], centres_m: Array, friction: Friction) -> Array:

@@ -12,15 +12,13 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from sessions.perception.carrying.friction_balance import Balance
-from sessions.perception.carrying.tip_steps import TipSteps
+from sessions.perception.carrying.tip_steps import HELD_BY, TipSteps
 
 _ROUND_m = 0.007
 """Lever at which an object is half as loose as a round one; cylinders have 1 mm, prisms and boxes 8 to 17 mm."""
 _LEAST_SHARE = 0.3
 """Of the steps in which a finger has to touch to say how the sides lean."""
 _MOST_LEAN = 0.15
-_HELD_BY = 2
-"""So many fingertips hold an object; each further one holds its turn too."""
 _LEAST_SPARE = 0.4
 """Friction at the edges of two contacts holds a turn a little, too."""
 _RCOND = 1e-3
@@ -43,7 +41,7 @@ class Roundness:
     @classmethod
     def of(cls, steps: TipSteps, balance: Balance) -> Roundness:
         """Of a carry; one in which two fingertips never held the object at once is not called round."""
-        spare = steps.felt.sum(axis=1) - _HELD_BY
+        spare = steps.felt.sum(axis=1) - HELD_BY
         turns, held = np.zeros(len(steps)), spare >= 0
         if not held.any():
             return cls(turns, 0.0)

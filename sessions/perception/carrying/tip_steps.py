@@ -7,8 +7,9 @@ rolling. Contacts are expressed in the middle of the step, so that a turn of the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +25,13 @@ from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples, SAMPLE_ns
 
 STEP_SAMPLES = 2
+HELD_BY, RAISED_m = 2, 0.001
+"""So many fingertips hold an object; a hand that is higher than where it grasped by so much has lifted it."""
 _JOINT_SMOOTHING_s = 0.040
 """Longer smears the beginning and the end of a motion (140 ms: twice the error); shorter leaves the sensors' noise."""
 _READING_SMOOTHING_s = 0.020
+_FREE_N = 0.15
+"""A fingertip that touches nothing reads no more: its own weight, and noise."""
 _SLACK_N = 0.1
 """Below this force a fingertip sinks in in proportion to it."""
 
@@ -75,15 +80,19 @@ class TipSteps:
 def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> TipSteps:
     """The steps of a carry, from its samples."""
     chosen = np.arange(0, len(samples.joints_rad), STEP_SAMPLES)
-    joints_rad = _smooth(samples.joints_rad, _JOINT_SMOOTHING_s)[chosen]
+    held = _is_held(samples)
+    cuts = np.flatnonzero(np.diff(held)) + 1
+    joints_rad = _smooth_between(cuts, samples.joints_rad, partial(_smooth, seconds=_JOINT_SMOOTHING_s))[chosen]
+    readings = _smooth_between(cuts, samples.readings, _smooth_known)[chosen[:-1]]
     world_T_palm = samples.world_T_forearm[chosen] @ forearm_T_palm_matrix(joints_rad, side)
     frames = world_T_palm[:, None] @ palm_T_distal_matrices(joints_rad, side)
-    felt = _felt(_smooth_known(samples.readings)[chosen[:-1]], frames[:-1, ..., :3, :3], fingertips)
+    felt = _felt(readings, frames[:-1, ..., :3, :3], fingertips)
     before, after = frames[:-1], frames[1:]
     starts, ends = (_transform(each, felt.points_distal_m) for each in (before, after))
     normals = _middle_normals(before, after, felt.normals_distal)
     steep = normals[..., 0] ** 2 + normals[..., 1] ** 2 > LARGEST_SLOPE**2
-    forces_N = np.where(felt.is_certain & steep, np.maximum(felt.normal_forces_N, 0.0), 0.0)
+    touching = felt.is_certain & steep & (held[chosen[:-1]] == held[chosen[1:]])[:, None]
+    forces_N = np.where(touching, np.maximum(felt.normal_forces_N, 0.0), 0.0)
     pushes_N = -(before[..., :3, :3] @ felt.forces_distal_N[..., None])[..., 0]
     moments_Nm, levers_m = _moments(starts, pushes_N, forces_N)
     along_N = np.sum(felt.forces_distal_N**2, axis=-1) - felt.normal_forces_N**2
@@ -120,6 +129,13 @@ def _felt(readings: Array, world_R_distal: Array, fingertips: Mapping[str, Conti
     return felt
 
 
+def _is_held(samples: CarrySamples) -> NDArray[np.bool_]:
+    """Samples in which enough fingertips feel more than their own weight, shape (n,): one beside a table, two above."""
+    heights_m = samples.world_T_forearm[:, 2, 3]
+    presses = np.linalg.norm(samples.readings[..., :3], axis=-1) >= _FREE_N
+    return np.asarray(presses.sum(axis=1) >= np.where(heights_m > heights_m[0] + RAISED_m, HELD_BY, 1))
+
+
 def _put(touches: TipTouches, into: TipTouches, at: int | list[int]) -> None:
     for each in fields(TipTouches):
         getattr(into, each.name)[:, at] = getattr(touches, each.name)
@@ -154,6 +170,13 @@ def _middle_normals(before: Array, after: Array, normals_distal: Array) -> Array
     """Normals turned by half of the step, unit length; zero where there is none."""
     turned = ((before[..., :3, :3] + after[..., :3, :3]) @ normals_distal[..., None])[..., 0]
     return np.asarray(turned / np.maximum(np.linalg.norm(turned, axis=-1, keepdims=True), 1e-12))
+
+
+def _smooth_between(cuts: NDArray[np.intp], values: Array, smooth: Callable[[Array], Array]) -> Array:
+    """Values smoothed on either side of each cut: fingers that have lost the object snap shut, and what they do then
+    is no motion of the object.
+    """
+    return np.concatenate([smooth(part) for part in np.split(values, cuts)])
 
 
 def _smooth(values: Array, seconds: float) -> Array:

@@ -23,6 +23,7 @@ from sessions.perception.carrying.tip_steps import TipSteps, tip_steps
 from sessions.perception.touch_capture import Measured
 from tests.support.baseline import assert_baseline
 from tests.support.held_objects import BOX, DISC, carried
+from tests.support.held_samples import POSTURE_rad
 
 OBJECT, PALM = Pose2(0.02, 0.01, 0.15), Pose2(0.024, 0.012, 0.2)
 DRAGGED = MeasuredFriction(table_N=1.4, table_sigma_N=0.2, tips_at_least=0.7, weight_N=3.0)
@@ -134,7 +135,7 @@ def test_words_of_carries_at_their_limits() -> None:
     changes: list[dict[str, Any]] = [
         *({"slip_m": 0.004}, {"slip_m": 0.00401}, {"slip_rad": far_rad}, {"slip_rad": 1.01 * far_rad}),
         *({"single_s": 0.05}, {"single_s": 0.06}, {"loose_s": 0.05}, {"loose_s": 0.06}),
-        *({"tilted_rad": 0.3}, {"resisted_N": 2.0}, {"void": ("FF", "TH")}),
+        *({"tilted_rad": 0.3}, {"dropped_m": 0.012}, {"resisted_N": 2.0}, {"void": ("FF", "TH")}),
     ]
     told = [[change, (now := replace(still, **change)).in_words(), now.is_remarkable] for change in changes]
     assert_baseline("sessions/carrying/words", {"told": told})
@@ -197,6 +198,24 @@ def test_steps_and_net_wrench_of_samples() -> None:
     told |= {"largest_N": largest_net_N(samples(), tips, "left"), "planar": planar_matrices(steps.world_T_palm)[::7]}
     told["upward_N"] = upward_N(tips, np.array([steps.world_T_palm[0, :3, :3]] * 5))
     assert_baseline("sessions/carrying/steps", told, rtol=1e-5, atol=1e-8)
+
+
+def test_fingers_that_snap_shut_behind_an_object_do_not_move_it() -> None:
+    """They lose it after 30 of 60 samples, and close by half a radian within 50 ms."""
+    count, lost = 60, 30
+    joints = np.tile(POSTURE_rad, (count, 1))
+    frames = palm_T_distal_matrices(joints, "right")
+    palm = forearm_T_palm_matrix(joints, "right")
+    readings = np.zeros((count, 5, 6))
+    for at in range(5):
+        push_N = np.array([0.0, 2.0 if at == 4 else -0.5, 0.0])
+        readings[:lost, at, :3] = (palm @ frames[:, at])[:lost, :3, :3].swapaxes(1, 2) @ push_N
+    joints[lost:] += 0.5 * np.minimum(np.arange(1, count - lost + 1) / 5, 1.0)[:, None]
+    held = CarrySamples(1e7 * np.arange(count), joints, np.tile(np.eye(4), (count, 1, 1)), readings)
+    steps = tip_steps(held, {finger: SoftTip(np.zeros(6)) for finger in FINGERS}, "right")
+    touching = steps.felt.all(axis=1)
+    assert touching.tolist() == (np.arange(len(steps)) < lost // 2 - 1).tolist()
+    np.testing.assert_allclose(steps.moves_m[touching], 0.0, atol=1e-12)
 
 
 def test_a_carry_foretold() -> None:

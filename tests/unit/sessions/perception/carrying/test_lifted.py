@@ -10,7 +10,7 @@ from gtsam import Pose2
 
 from drivers.core.contacts import FINGERS
 from sessions.perception.carrying.carry import Carry, CarryOdometry
-from sessions.perception.carrying.lifted import raised
+from sessions.perception.carrying.lifted import dropped_m, raised
 from sessions.perception.carrying.tip_steps import TipSteps
 from tests.support.held_objects import BOX, DISC, carried
 
@@ -56,3 +56,21 @@ def test_a_hand_that_rises_with_one_finger_lifts_nothing() -> None:
     forces_N = steps.forces_N.copy()
     forces_N[:, [FINGERS.index(finger) for finger in FINGERS if finger != "TH"]] = 0.0
     assert not raised(replace(steps, forces_N=forces_N)).any()
+
+
+def lost(steps: TipSteps, at: int) -> TipSteps:
+    """No fingertip feels the object from this step on."""
+    return replace(steps, forces_N=np.where(np.arange(len(steps))[:, None] < at, steps.forces_N, 0.0))
+
+
+def test_an_object_that_is_lost_up_there_was_dropped_and_may_lie_anywhere_near() -> None:
+    held, dropped = carry(lifted(BOX)), carry(lost(lifted(BOX), COUNT // 2))
+    assert dropped.dropped_m == pytest.approx(UP_m)
+    assert "dropped from 15 mm" in dropped.in_words()
+    assert dropped.is_remarkable
+    assert dropped.sigma.translation_m > max(UP_m / 3, held.sigma.translation_m)
+
+
+def test_what_is_held_until_it_stands_and_what_is_lost_on_the_table_is_not_dropped() -> None:
+    assert dropped_m(lifted(BOX)) == 0.0
+    assert dropped_m(lost(carried(BOX, object_motion=MOTION, palm_motion=MOTION), 50)) == 0.0
