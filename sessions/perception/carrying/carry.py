@@ -213,7 +213,7 @@ class CarryOdometry:
         ]
         parts_rad = [
             while_held_rad,
-            noise.round_rad * float(held.turns @ _turns_rad(steps)),
+            noise.round_rad * float(held.turns @ steps.palm_turns_rad),
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],
@@ -260,9 +260,9 @@ def _unseen(steps: TipSteps, centres_m: Array, fingertips: Mapping[str, Continuo
     doubt = np.maximum(poorly, doubt)
     if not doubt.any():
         return np.zeros(2)
-    moves = planar_matrices(steps.world_T_palm)
+    moves = steps.palm_moves
     shifts = np.einsum("nij,nj->ni", moves[:, :2, :2], centres_m) + moves[:, :2, 2] - centres_m
-    return np.array([np.linalg.norm(shifts, axis=1) @ doubt, _turns_rad(steps) @ doubt])
+    return np.array([np.linalg.norm(shifts, axis=1) @ doubt, steps.palm_turns_rad @ doubt])
 
 
 def _squeezed_out(steps: TipSteps, motions: Array) -> Array:
@@ -271,15 +271,9 @@ def _squeezed_out(steps: TipSteps, motions: Array) -> Array:
     """
     tips_m = np.where(steps.felt, np.linalg.norm(steps.moves_m, axis=-1), 0.0).max(axis=1)
     farther_m = np.hypot(motions[:, 0], motions[:, 1]) - _FARTHER * tips_m
-    turns_rad = _turns_rad(steps)
+    turns_rad = steps.palm_turns_rad
     more_rad = np.where(turns_rad > _TURNS_rad, np.abs(motions[:, 2]) - _FARTHER * turns_rad, 0.0)
     return np.array([np.maximum(farther_m, 0.0).sum(), np.maximum(more_rad, 0.0).sum()])
-
-
-def _turns_rad(steps: TipSteps) -> Array:
-    """How far the hand turned in each step, shape (n,)."""
-    moves = planar_matrices(steps.world_T_palm)
-    return np.abs(np.arctan2(moves[:, 1, 0], moves[:, 0, 0]))
 
 
 def _pose(motion: Array) -> Pose2:

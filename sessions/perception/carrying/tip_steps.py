@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from drivers.force.touches import TipSensing
 from drivers.shadow.model.kinematics import forearm_T_palm_matrix, palm_T_distal_matrices
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples, SAMPLE_ns
+from sessions.perception.carrying.planar_motions import planar_matrices
 
 STEP_SAMPLES = 2
 HELD_BY, RAISED_m = 2, 0.001
@@ -75,6 +76,16 @@ class TipSteps:
     def felt(self) -> NDArray[np.bool_]:
         """Which fingers have a contact, shape (n, 5)."""
         return np.asarray(self.forces_N > 0.0)
+
+    @cached_property
+    def palm_moves(self) -> Array:
+        """The palm's motion on the table in each step, homogeneous matrices, shape (n, 3, 3)."""
+        return planar_matrices(self.world_T_palm)
+
+    @cached_property
+    def palm_turns_rad(self) -> Array:
+        """How far it turned in each step, without sign, shape (n,)."""
+        return np.abs(np.arctan2(self.palm_moves[:, 1, 0], self.palm_moves[:, 0, 0]))
 
 
 def tip_steps(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> TipSteps:
