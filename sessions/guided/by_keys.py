@@ -166,7 +166,7 @@ class GraspByKeys(GraspCycle):
         self._console.enter(Stage.HOLD, "Bringing the fingers to the contact force", Ask.GIVE_UP)
         super().settle()
         self._console.enter(Stage.HOLD, "Hold still. SPACE: capture; x: give up", Ask.CAPTURE, Ask.GIVE_UP)
-        hold_N = self.fingers.balanced_forces_N(self.fingers.touching, self.settings.contact_force_N)
+        hold_N = self.fingers.balanced_forces_N(self.fingers.touching, self.contact_N)
         while not self._console.wants_capture():
             self.fingers.servo_forces(hold_N)
             self._motion.tick()

@@ -86,6 +86,7 @@ class CycleSettings(StrictModel):
         held_up_rad: angle by which a joint falls behind if something holds the finger.
         closing_most_N: force on a fingertip at which all fingers stop: links without sensors may be pushing the object.
         contact_force_N: force that each touching finger settles to for the capture; the thumb takes the others' sum.
+        gentle_force_N: the same for an object that leans easily: fingers and thumb are not level.
         settle_s: time for that.
         rest_s: rest after every motion that precedes a measurement.
         capture_s: length of the capture (20 samples at 100 Hz).
@@ -127,6 +128,7 @@ class CycleSettings(StrictModel):
     held_up_rad: float = Field(default=0.12, gt=0.0)
     closing_most_N: float = Field(default=2.0, gt=0.0)
     contact_force_N: float = Field(default=0.4, gt=0.0)
+    gentle_force_N: float = Field(default=0.2, gt=0.0)
     settle_s: float = Field(default=0.3, ge=0.0)
     rest_s: float = Field(default=0.2, gt=0.0)
     capture_s: float = Field(default=0.2, gt=0.0)

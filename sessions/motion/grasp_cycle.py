@@ -188,7 +188,12 @@ class GraspCycle:
 
     def settle(self) -> None:
         """Bring the fingers that touch to the contact force, then let hand and object come to rest."""
-        self.fingers.settle()
+        self.fingers.settle(self.contact_N)
+
+    @property
+    def contact_N(self) -> float:
+        """Force that each touching finger settles to."""
+        return self.settings.gentle_force_N if self.plan.is_gentle else self.settings.contact_force_N
 
     def capture(self) -> Grasp:
         """Collect samples, compute a grasp from them, and take a picture of the held object."""

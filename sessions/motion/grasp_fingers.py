@@ -90,9 +90,9 @@ class GraspFingers:
         """Whether this tip would touch another on its way to a progress."""
         return nears(self.table, self.progress, finger, to, 2 * self._hand.radius_m)
 
-    def settle(self) -> None:
-        """Bring the fingers that touch to the contact force, then let hand and object come to rest."""
-        self.build_up(self.balanced_forces_N(self.touching, self.settings.contact_force_N), self.settings.settle_s)
+    def settle(self, force_N: float) -> None:
+        """Bring the fingers that touch to a force, then let hand and object come to rest."""
+        self.build_up(self.balanced_forces_N(self.touching, force_N), self.settings.settle_s)
         self._motion.wait(self.settings.rest_s)
 
     def ease(self, touching: frozenset[str], from_N: float) -> None:

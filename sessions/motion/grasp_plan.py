@@ -45,6 +45,7 @@ class GraspPlan:
         only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
         places: where it touches that side, one after another.
         may_shift: where a fingertip lands the hand may try again a little aside.
+        is_gentle: fingertips press less than usual: what they hold leans easily.
     """
 
     frame: GraspFrame
@@ -55,6 +56,7 @@ class GraspPlan:
     only_touch: bool = False
     places: tuple[TouchPlace, ...] = ()
     may_shift: bool = True
+    is_gentle: bool = False
 
     def raised(self, by_m: float, highest_m: float) -> GraspPlan | None:
         """The same grasp so much higher, in whole millimetres; None above ``highest_m``."""

@@ -140,7 +140,8 @@ class Toucher:
 
         Args:
             places: fingers move along their frames' y axes, over the origin and a little beyond; of those after the
-                first it is known where the side is, and what the hand meets on its way there ends the touch.
+                first it is known where the side is, and what the hand meets on its way there ends the touch; so does an
+                object that has given way, which leans by now.
             side: where the palm stands, one of :data:`~drivers.shadow.closing.closing.SIDES`.
             from_m: where the fingertips begin, counted from the origin.
             beyond_m: how far over the origin; as the settings say unless given.
@@ -159,12 +160,13 @@ class Toucher:
             self._rise_over(lane.frame, table, from_m)
             return None
         motion.tare(self._cycle.rest_s)
-        landed = self._lay_against(lane)
+        landed = latest = self._lay_against(lane)
         for following in further:
             lane = replace(lane, place=following)
-            if not self._go_along(lane):
+            if self._has_given_way(latest) or not self._go_along(lane):
                 break
-            landed = np.vstack([landed, self._lay_against(lane)])
+            latest = self._lay_against(lane)
+            landed = np.vstack([landed, latest])
         motion.move_base(lane.joints(motion, from_m), *self._travel)
         self._rise_over(lane.frame, table, from_m)
         if contacts := motion.runtime.perception.probed[known:]:
@@ -182,6 +184,11 @@ class Toucher:
         self._lay_on(lane.table, lane.column, along, lane.frame, self.settings.rake_N, 0.0, lane.place.up_to_m)
         self.capture()
         return landed
+
+    def _has_given_way(self, landed_m: Array) -> bool:
+        """Whether what fingertips have met at these places, shape (n, 3), is not felt any more."""
+        felt_N = max(self._motion.loads_N().values(), default=0.0)
+        return len(landed_m) > 0 and felt_N < self.settings.met_N / 4
 
     def _go_along(self, lane: Lane) -> bool:
         """Back a little, and over to another lane. Returns whether nothing was met there."""

@@ -32,6 +32,9 @@ _OPEN_m = (0.012, 0.025)
 _SLENDER = 0.2
 """Of its height the foot reaches from the middle. A box on a bulged bottom creeps over by a degree in every touch."""
 
+_UNSTEADY = 0.15
+"""So much more slender, it leans in a grasp: thumb and fingers press at different heights."""
+
 _UPWARD = 0.7
 """Least vertical part of the normal of a contact on the top."""
 
@@ -200,6 +203,10 @@ class FeltObject:
     def is_slender(self, way: Array) -> bool:
         """Whether it is so tall against its foot along a horizontal unit vector, shape (2,), that little leans it."""
         return self.standing_box.foot_along_m(way) < _SLENDER * self.standing_box.size_m[2]
+
+    def is_unsteady(self, way: Array) -> bool:
+        """Whether even a grasp that closes along a horizontal unit vector, shape (2,), leans it."""
+        return self.standing_box.foot_along_m(way) < _UNSTEADY * self.standing_box.size_m[2]
 
     def may_be_pushed(self, way: Array) -> bool:
         """Whether a touch along ``way`` leans it no farther than the last one has; see :meth:`on_pushed`."""

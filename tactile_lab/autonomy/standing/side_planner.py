@@ -78,10 +78,12 @@ class SidePlanner(ActionPlanner):
         approach = np.array(closing(name, height_m, self.hand).approach[:2])
         c, s = np.cos(yaw_rad), np.sin(yaw_rad)
         way = np.array([[c, -s], [s, c]]) @ approach
-        half_m = box.half_along_m(way)
+        half_m, is_gentle = box.half_along_m(way), self.felt.is_unsteady(np.array([c, s]))
+        if self.felt.is_unsteady(way) and not is_gentle:
+            return None
         for depth_m in np.arange(_DEEPEST_m, _SHALLOWEST_m - 1e-9, -_DEPTH_STEP_m):
             x, y = np.array([box.x_m, box.y_m]) - (half_m - depth_m) * way
-            plan = GraspPlan(GraspFrame(float(x), float(y), yaw_rad), name, height_m)
+            plan = GraspPlan(GraspFrame(float(x), float(y), yaw_rad), name, height_m, is_gentle=is_gentle)
             if self._was_blocked(plan, float(depth_m)) or not self.reach.holds(plan, self.hand):
                 continue
             if not is_way_clear(plan, self.hand, box):

@@ -36,8 +36,8 @@ _PLACES, _STEP_m, _LEAST_NEWS_m = 3, 0.09, 0.015
 """One coming of the hand touches a side at so many places, each no farther from the last, and with its contacts
 so far from those that are known on average."""
 
-_CLOSINGS_REACH_m = 0.05
-"""So far from the ends of a side fingers that close across it get."""
+_CLOSINGS_REACH_m = 0.055
+"""So far from the ends of a side closings tell where it is; a box that was felt askew seems wider than it is."""
 
 _HIGHEST = 0.8
 """Of its height an object that does not slide is pushed at."""
@@ -125,7 +125,7 @@ class TouchPlanner(ActionPlanner):
             if box.distances_m(np.array([*lane, box.size_m[2] / 2])) > -_INSIDE_m:
                 continue
             front = lane - box.way_out_m(lane, -way) * way
-            is_beyond = wide_m - abs(lane_m) > _CLOSINGS_REACH_m
+            is_beyond = box.foot_along_m(across) - abs(lane_m) > _CLOSINGS_REACH_m
             for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m):
                 if height_m < min(up_to_m, low_m) or (is_beyond and self._hardly_leans(float(height_m), foot_m)):
                     place = TouchPlace(GraspFrame(float(front[0]), float(front[1]), yaw_rad), float(height_m), laid_m)

@@ -219,3 +219,15 @@ def test_coupled_joints_are_compared_together(strain: Strain) -> None:
     strain.world.joints_rad[JOINT_INDEX["FFJ1"]] += 0.05
     strain.world.cycle()
     assert strain.motion.bent(0.01) == ("FF",)
+
+
+@pytest.mark.parametrize(("is_gentle", "force_N"), [(False, QUICK.contact_force_N), (True, QUICK.gentle_force_N)])
+def test_what_leans_easily_is_held_with_less_force(
+    is_gentle: bool, force_N: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cycle, settled_N = Strain(monkeypatch).cycle, []
+    monkeypatch.setattr(cycle.fingers, "settle", settled_N.append)
+    cycle._begin(GraspPlan(GraspFrame(0.0, 0.0, 0.0), "pinch", 0.022, is_gentle=is_gentle))
+    cycle.settle()
+    assert settled_N == [force_N]
+    assert QUICK.gentle_force_N < QUICK.contact_force_N

@@ -15,6 +15,7 @@ from sessions.motion.grasp_cycle import GraspCycle
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, TouchPlace
 from sessions.motion.motion import Motion
+from sessions.motion.probing.lane import Lane
 from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m, lowest_ahead
 from sessions.motion.probing.touching import Toucher
 from sessions.motion.safety import SafetySettings, SafetySupervisor
@@ -169,6 +170,25 @@ def test_one_coming_touches_a_side_at_several_places_and_draws_back_between_them
     assert np.count_nonzero(np.diff(np.array(felt).astype(int)) == 1) == 2
     assert world.session_events.count(EventKind.TOUCH_END) == 2
     assert world.base_q[2] > motion.base_joints(frame, closing("pinch-from-left", 0.15, TIP))[2]
+
+
+@pytest.mark.parametrize(("felt_N", "met", "touched"), [(0.2, True, 3), (0.0, True, 1), (0.0, False, 3)])
+def test_what_gave_way_when_it_was_touched_is_not_touched_at_further_places(
+    felt_N: float, met: bool, touched: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, laid = motion_on(DiscWorld(disc(0.15))), []
+    motion.tallest_m, toucher = 0.15, Toucher(motion, QUICK, TIP)
+
+    def lay_against(lane: Lane) -> Array:
+        laid.append(lane)
+        return np.zeros((int(met), 3))
+
+    monkeypatch.setattr(toucher, "_lay_against", lay_against)
+    monkeypatch.setattr(toucher, "_go_along", lambda lane: True)
+    monkeypatch.setattr(motion, "loads_N", lambda: dict.fromkeys(FINGERS, felt_N))
+    monkeypatch.setattr(toucher.guard, "is_met", lambda: False)
+    toucher.touch_side([TouchPlace(GraspFrame(0.0, 0.05, 0.0), 0.05)] * 3, "left", 0.1, 0.02)
+    assert len(laid) == touched
 
 
 @pytest.mark.parametrize("met", [("links",), ("FF",)])

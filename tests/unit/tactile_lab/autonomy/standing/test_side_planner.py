@@ -18,7 +18,7 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
-from tactile_lab.autonomy.standing.candidate import SideReach
+from tactile_lab.autonomy.standing.candidate import SideReach, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner
 from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear
@@ -104,6 +104,21 @@ def test_next_grasp_is_where_nothing_was_touched_until_nothing_is_left() -> None
     assert max(np.diff(sorted(heights))) < 0.03
     assert beside.exhausted.startswith("nothing left that the hand can reach: ")
     assert "mm high" in beside.exhausted
+
+
+def all_grasps(felt: BoundingBox) -> list[GraspPlan]:
+    return [one.plan for one in planner(felt)._grasping._candidates()]
+
+
+def test_what_is_unsteady_is_held_gently_and_never_by_a_hand_that_comes_to_its_broad_side() -> None:
+    slender, stout = all_grasps(box(0.045, 0.097, 0.177, -0.37)), all_grasps(box(0.070, 0.070, 0.120))
+    assert slender
+    assert stout
+    assert {plan.is_gentle for plan in slender} == {True}
+    assert {plan.is_gentle for plan in stout} == {False}
+    thin = Pose2(0.0, 0.0, -0.37).rotation().matrix()[:, 0]
+    assert max(abs(thin @ approach_of(plan, TIP)) for plan in slender) < 0.1
+    assert {plan.is_gentle for plan in all_grasps(box(0.050, 0.050, 0.190))} == {True}, "unsteady all around"
 
 
 def meet_one(beside: StandingPlanner, *, is_placed: bool) -> bool:

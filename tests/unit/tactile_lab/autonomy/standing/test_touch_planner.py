@@ -149,6 +149,14 @@ def test_what_is_slender_is_touched_as_low_as_can_be_by_one_finger_and_not_twice
     assert all(broad @ approach_of(one.plan, TIP) < 0.1 for one in sides(known))
 
 
+def test_what_closings_reach_from_both_ends_is_not_touched_high_up_however_askew_the_hand_comes() -> None:
+    high = np.array([0.097, 0.046]) / 2
+    known = FeltObject(BoundingBox(Pose2(0.0, 0.0, np.radians(80.0)), -high, high, 0.008, 0.177, {}))
+    broad = [one for one in sides(known) if known.is_slender(approach_of(one.plan, TIP))]
+    assert any(one.plan.frame.yaw_rad == WINDOW_rad[1] for one in broad), "no hand comes askew"
+    assert {place.height_m for one in broad for place in one.plan.places} <= {0.020, 0.032}
+
+
 def test_a_blocked_touch_is_not_tried_again() -> None:
     touches = planner(felt())
     first = touches.best()
