@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from gtsam import Pose3
-
 from drivers.core.contacts import Grasp
 from sessions.conductor.decisions import SessionRoles
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.grasp_plan import holds
+from sessions.perception.hand_odometry import HandMotion
 from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
@@ -39,15 +38,15 @@ class Carrier:
             last: no grasp follows.
         """
         self._roles.supervisor.count_contacts(len(grasp.contacts))
-        hand_motion, is_held = Pose3(), holds(grasp.touching)
+        motion, is_held = HandMotion(), holds(grasp.touching)
         if weighed and is_held:
             is_held = self._weigh(grasp.touching)
-            hand_motion = self._told_carry() or hand_motion
+            motion = self._told_carry() or motion
         if wanted.moves and is_held and not last:
-            hand_motion = self._reorient(grasp, wanted)
-        self._roles.decisions.on_carry(hand_motion)
+            motion = self._reorient(grasp, wanted)
+        self._roles.decisions.on_carry(motion)
 
-    def _reorient(self, grasp: Grasp, wanted: Reorientation) -> Pose3:
+    def _reorient(self, grasp: Grasp, wanted: Reorientation) -> HandMotion:
         """The object's motion since the capture."""
         cycle = self._roles.performer
         self._forecast(grasp, wanted)
@@ -59,7 +58,7 @@ class Carrier:
             self._tell(Level.WARNING, f"{', '.join(cycle.jammed)} pressed hard: re-orientation stopped early")
         if cycle.slipped is not None:
             self._tell(Level.INFO, f"the object slips ({cycle.slipped.in_words()}): re-orientation stopped early")
-        return self._told_carry() or palm_motion
+        return self._told_carry() or HandMotion(palm_motion)
 
     def _forecast(self, grasp: Grasp, wanted: Reorientation) -> None:
         """Hold the object as hard as it needs, and say what is to be expected."""
@@ -88,7 +87,7 @@ class Carrier:
         self._tell(Level.INFO, f"weighed: {end}; {self._runtime.perception.properties.in_words()}")
         return end.is_held
 
-    def _told_carry(self) -> Pose3 | None:
+    def _told_carry(self) -> HandMotion | None:
         """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""
         perception = self._runtime.perception
         if (slip := perception.heard_slip) is not None:
@@ -100,4 +99,4 @@ class Carrier:
             self._tell(level, words)
         else:
             self._runtime.log(level, "odometry", words)
-        return perception.hand_motion_world
+        return perception.hand_motion

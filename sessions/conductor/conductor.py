@@ -263,7 +263,7 @@ class Conductor:
             return
         undone = self._runtime.undo()
         self._grasps.pop()
-        self._estimation.undo(self._runtime.perception.hand_motion_world)
+        self._estimation.undo(self._runtime.perception.hand_motion.world)
         self._decisions.on_undo()
         self._prepared = None
         self._tell(Level.INFO, f"grasp {undone.index + 1} undone: {reason}")

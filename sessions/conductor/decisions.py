@@ -22,6 +22,7 @@ from sessions.motion.safety import InterruptGuard, SafetySupervisor
 from sessions.motion.weighing import LiftEnd
 from sessions.perception.carrying.forecast import Forecast
 from sessions.perception.carrying.slip import Slip
+from sessions.perception.hand_odometry import HandMotion
 
 
 @dataclass(frozen=True)
@@ -119,7 +120,7 @@ class DecisionMaker(Protocol):
     def may_weigh(self, plan: GraspPlan) -> bool:
         """Whether the object held at ``plan`` may be dragged and lifted a little."""
 
-    def on_carry(self, hand_motion_world: Pose3) -> None:
+    def on_carry(self, motion: HandMotion) -> None:
         """The hand carried the object since the grasp."""
 
     def on_estimate(self, step: PoseStep) -> None:
@@ -237,9 +238,9 @@ class AutonomousDecisions:
     def may_weigh(self, plan: GraspPlan) -> bool:
         return True
 
-    def on_carry(self, hand_motion_world: Pose3) -> None:
+    def on_carry(self, motion: HandMotion) -> None:
         self._centre_m = None
-        self.estimator.ask(EstimatorService.on_carry, hand_motion_world)
+        self.estimator.ask(EstimatorService.on_carry, motion)
 
     def on_estimate(self, step: PoseStep) -> None:
         self._centre_m = None

@@ -17,6 +17,7 @@ from gtsam import Pose3
 from drivers.core.contacts import Array, Grasp
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.perception.hand_odometry import HandMotion
 
 
 @dataclass(frozen=True)
@@ -187,8 +188,8 @@ class GraspPlanner(Protocol):
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """A grasp was measured at ``plan``. Returns how to carry the object now."""
 
-    def on_carry(self, hand_motion_world: Pose3) -> None:
-        """The hand carried the object since the last grasp."""
+    def on_carry(self, motion: HandMotion) -> None:
+        """The hand carried the object since the last grasp, or left it where it is."""
 
 
 class EstimatorService(Estimator, GraspPlanner, Protocol):

@@ -30,6 +30,11 @@ class HandMotion:
         return HandMotion(later.world * self.world, _joined(self, later))
 
     @property
+    def is_carry(self) -> bool:
+        """Whether the object is where it was not before."""
+        return not self.world.equals(Pose3(), 1e-9)
+
+    @property
     def is_rest(self) -> bool:
         """Whether the hand has not moved the object."""
         return self.sigma is None and self.world.equals(Pose3(), 0.0)
@@ -58,9 +63,9 @@ class HandOdometry:
         return self._hold_start is not None
 
     @property
-    def motion_world(self) -> Pose3:
-        """Motion in the completed holds since the last grasp."""
-        return self._motion.world
+    def motion(self) -> HandMotion:
+        """In the completed holds since the last grasp."""
+        return self._motion
 
     @property
     def grasp_count(self) -> int:

@@ -171,9 +171,9 @@ class Perception:
         return self._carried.is_holding
 
     @property
-    def hand_motion_world(self) -> Pose3:
+    def hand_motion(self) -> HandMotion:
         """How the hand has carried the object since the last grasp, in completed holds."""
-        return self._carried.motion_world
+        return self._carried.motion
 
     @property
     def carry(self) -> Carry | None:

@@ -16,6 +16,7 @@ from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.estimated_object import EstimatedObject
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
@@ -80,7 +81,7 @@ class Planner:
         self._doubted = False
         self._chooser, self._grasps = chooser, grasps
         self._here: GraspFrame | None = None
-        self._carried = False
+        self._carried = HandMotion()
         self._box: BoundingBox | None = None
         self._reach, self._touches = reach or SideReach(), touches
         self._standing: StandingPlanner | None = None
@@ -325,17 +326,16 @@ class Planner:
         knowledge = replace(knowledge, covariance=covariance)
         return self._chooser.turn(plan.frame, knowledge, grasp, turn_rad, self._has_room)
 
-    def on_carry(self, hand_motion_world: Pose3) -> None:
-        """Note that the hand carried the object since the last grasp."""
-        self._object.hand_motion, motion = hand_motion_world, planar(hand_motion_world)
+    def on_carry(self, carried: HandMotion) -> None:
+        """Note how the hand carried the object since the last grasp, and how well that is known."""
+        self._carried, self._object.hand_motion, motion = carried, carried.world, planar(carried.world)
         self._box = None if self._box is None else self._box.move(motion)
-        self._carried = not hand_motion_world.equals(Pose3(), 1e-9)
-        if self._carried:
+        if carried.is_carry:
             self._landings_m = []
         if self._here is not None:
             pose = motion * Pose2(self._here.x_m, self._here.y_m, self._here.yaw_rad)
             self._here = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))
-        self._rule.centre_m = np.asarray(planar(hand_motion_world).transformFrom(self.centre_m))
+        self._rule.centre_m = np.asarray(motion.transformFrom(self.centre_m))
 
     def on_undo(self, hand_motion_world: Pose3) -> None:
         """Note that the last grasp was undone; the motion is the hand odometry since the one before."""

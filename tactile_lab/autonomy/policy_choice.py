@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from drivers.core.contacts import Array, Grasp
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.hand_candidates import HandCandidate, HandLimits, HasRoom, Offer, anywhere, offer
 from tactile_lab.autonomy.regrasp_planner import RegraspPlanner, with_contacts
 from tactile_lab.autonomy.variance_planner import KnownShape
@@ -22,7 +23,7 @@ from tactile_lab.slam.exploration.asking import ask
 from tactile_lab.slam.exploration.candidates import ModelledObject, PredictedContacts, predict_contacts
 from tactile_lab.slam.exploration.policy import Belief, Decision, Policy, RivalObject
 from tactile_lab.slam.exploration.prediction import sampled_displacements
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, planar_motion
 
 _SAMPLED_SURFACES = 32
 
@@ -236,9 +237,12 @@ class PolicyChooser:
             rivals=knowledge.rivals,
         )
 
-    def spread(self, covariance: Array, carried: bool) -> Array:
-        """Covariance of the pose now, from that at the last grasp."""
-        return covariance + np.diag(self._noise.sigmas**2) if carried else covariance
+    def spread(self, covariance: Array, carried: HandMotion) -> Array:
+        """Covariance of the pose now, from that at the last grasp: a carry that was felt costs less than another."""
+        if not carried.is_carry:
+            return covariance
+        noise = self._noise.after(planar_motion(carried.world), carried.sigma)
+        return covariance + np.diag(noise.sigmas**2)
 
 
 def _as_modelled_object(knowledge: Knowledge, pose: Pose2) -> ModelledObject:

@@ -19,6 +19,7 @@ from drivers.core.poses import planar
 from sessions.conductor.estimator import Change, Estimate, PlannedGrasp, Reorientation
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.estimate_messages import surface_message, trust_message
 from tactile_lab.autonomy.freed_memory import return_freed_memory
 from tactile_lab.autonomy.planner import Planner
@@ -89,9 +90,9 @@ class SlamService:
         """As :meth:`Planner.on_grasp`."""
         return self.planner.on_grasp(grasp, plan)
 
-    def on_carry(self, hand_motion_world: Pose3) -> None:
+    def on_carry(self, motion: HandMotion) -> None:
         """As :meth:`Planner.on_carry`."""
-        self.planner.on_carry(hand_motion_world)
+        self.planner.on_carry(motion)
 
     def estimate(self, grasp: Grasp, known: int) -> tuple[Estimate, ...]:
         """See :meth:`sessions.conductor.estimator.Estimator.estimate`; the planner is notified too."""

@@ -25,6 +25,7 @@ from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, evade, holds
 from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.hand_candidates import grasp_time_s, table_of
 from tactile_lab.experiments.data.sensing import line_to_contact, measured_contact, planar_pose
 from tactile_lab.experiments.data.solids import Solid
@@ -114,15 +115,15 @@ class KinematicHand:
         self._count, self._motion = self._count + 1, Pose3()
         return Attempt(reached, landings, grasp)
 
-    def carry(self, wanted: Reorientation, attempt: Attempt) -> Pose3:
+    def carry(self, wanted: Reorientation, attempt: Attempt) -> HandMotion:
         """Turn and shift the object in the hand, with slip. Does nothing if it is not held, or is to be left in place.
 
         Returns:
-            The object's motion in the world, as the hand knows it.
+            The object's motion in the world, as the hand knows it, and how well where it felt it.
         """
         assert attempt.grasp is not None
         if not (wanted.moves and holds(attempt.grasp.touching)):
-            return Pose3()
+            return HandMotion()
         frame = attempt.plan.frame
         about = np.array([frame.x_m, frame.y_m, 0.0])
         shift = np.append(wanted.shift_world_m, 0.0)
@@ -136,7 +137,7 @@ class KinematicHand:
         self._motion = motion
         cycle, way_m = self._cycle, float(np.linalg.norm(shift))
         self.elapsed_s += max(abs(wanted.turn_rad) / cycle.carry_turn_rad_s, way_m / cycle.carry_m_s) + cycle.rest_s
-        return motion
+        return HandMotion(motion, self._felt)
 
     @property
     def _landing_s(self) -> float:

@@ -29,6 +29,7 @@ from sessions.conductor.estimator import PolicyChoice, Reorientation
 from sessions.conductor.estimator_client import EstimatorClient
 from sessions.conductor.policy_decisions import PolicyDecisions
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.policy_choice import Choice
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.evaluation.registration import registration_rms_mm
@@ -272,9 +273,9 @@ class UntilExplored(PolicyDecisions):
         self._monitor.grasps.append(grasp)
         return super().on_capture(grasp, plan)
 
-    def on_carry(self, hand_motion_world: Pose3) -> None:
-        self._monitor.carried += not hand_motion_world.equals(Pose3(), 1e-9)
-        super().on_carry(hand_motion_world)
+    def on_carry(self, motion: HandMotion) -> None:
+        self._monitor.carried += motion.is_carry
+        super().on_carry(motion)
 
     def decide(self, index: int) -> Decision:
         return End("explored, or the budget is spent") if self._monitor.is_over else super().decide(index)

@@ -8,18 +8,20 @@ import numpy as np
 import pytest
 from gtsam import Pose3, Rot3
 
+from drivers.core.contacts import StepSigma
 from sessions.conductor.carrier import Carrier
 from sessions.conductor.estimator import Reorientation
 from sessions.motion.weighing import LiftEnd
 from sessions.perception.carrying.forecast import Forecast
 from sessions.perception.carrying.slip import Slip
 from sessions.perception.carrying.vibration import HeardSlip
+from sessions.perception.hand_odometry import HandMotion
 from sessions.recording.recorder import Level
 
 TURN, STAY = Reorientation(0.4, np.zeros(2)), Reorientation(0.0, np.zeros(2))
 HELD = frozenset({"FF", "MF", "TH"})
 FIRM = Forecast(force_N=1.2, slip_m=0.001, slip_rad=0.01, leans=False)
-FELT = Pose3(Rot3(), np.array([0.01, 0.0, 0.0]))
+FELT = HandMotion(Pose3(Rot3(), np.array([0.01, 0.0, 0.0])), StepSigma(0.0004, 0.01))
 SLIPPERY = Forecast(force_N=1.5, slip_m=0.012, slip_rad=0.2, leans=True)
 
 
@@ -57,7 +59,7 @@ class Bench:
         )
         properties = SimpleNamespace(in_words=lambda: "mass 300 g", mass_kg=mass_kg)
         runtime = SimpleNamespace(
-            perception=SimpleNamespace(carry=carry, heard_slip=heard, properties=properties, hand_motion_world=FELT),
+            perception=SimpleNamespace(carry=carry, heard_slip=heard, properties=properties, hand_motion=FELT),
             log=lambda level, source, text: self.logged.append(text),
         )
         self.grasp = SimpleNamespace(touching=touching, contacts=())
@@ -94,7 +96,7 @@ def test_nothing_is_said_of_an_object_that_was_not_measured():
 def test_what_stays_is_neither_foretold_nor_squeezed(wanted, touching, last):
     bench = Bench(touching=touching).carry(wanted, last=last)
     assert bench.done == []
-    assert [motion.equals(Pose3(), 1e-12) for motion in bench.motions] == [True]
+    assert [motion.world.equals(Pose3(), 1e-12) for motion in bench.motions] == [True]
 
 
 def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
@@ -129,7 +131,7 @@ def test_how_the_object_moved_is_what_the_fingertips_felt(remarkable, told):
 def test_a_slip_that_was_heard_is_logged_and_the_object_moved_with_the_palm():
     bench = Bench(heard=HeardSlip(("FF", "TH"), 0.8)).carry()
     assert bench.logged[-1] == "the object slips under FF and TH, for 0.8 s"
-    assert [motion.equals(Pose3(), 1e-12) for motion in bench.motions] == [True]
+    assert [motion.world.equals(Pose3(), 1e-12) for motion in bench.motions] == [True]
 
 
 def test_a_re_orientation_that_fingers_stopped_is_told():

@@ -15,6 +15,7 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.variance_planner import (
@@ -181,7 +182,7 @@ def test_a_surface_is_felt_at_all_heights_whatever_was_raised() -> None:
 
 def test_estimate_is_carried_with_the_hand() -> None:
     chooser = planner(known_slam())
-    chooser.on_carry(Pose3(Rot3(), np.array([0.1, 0.0, 0.0])))
+    chooser.on_carry(HandMotion(Pose3(Rot3(), np.array([0.1, 0.0, 0.0]))))
     chooser.on_estimate(3, True)
     np.testing.assert_allclose(chooser.centre_m, [0.1, 0.0], atol=3e-3)
     assert abs(chooser.plan(4).frame.x_m - 0.1) < 0.03
@@ -201,9 +202,9 @@ def test_landings_are_forgotten_when_the_object_was_moved_and_no_sooner() -> Non
     chooser = planner(known_slam())
     first = chooser.plan(1)
     chooser.on_landings([open_tips_m(first)[0]])
-    chooser.on_carry(Pose3())
+    chooser.on_carry(HandMotion(Pose3()))
     assert np.linalg.norm(open_tips_m(chooser.plan(1)) - open_tips_m(first), axis=1).max() > 0.01
-    chooser.on_carry(Pose3(Rot3(), np.array([1e-6, 0.0, 0.0])))
+    chooser.on_carry(HandMotion(Pose3(Rot3(), np.array([1e-6, 0.0, 0.0]))))
     np.testing.assert_allclose(open_tips_m(chooser.plan(1)), open_tips_m(first), atol=1e-5)
 
 

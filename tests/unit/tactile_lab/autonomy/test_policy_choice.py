@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from gtsam import Pose2, Pose3
+from gtsam import Pose2, Pose3, Rot3
 
-from drivers.core.contacts import Contact, Grasp
+from drivers.core.contacts import Contact, Grasp, StepSigma
 from sessions.motion.grasp_frame import GraspFrame
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.hand_candidates import (
     OUT_OF_REACH,
     HasRoom,
@@ -75,6 +76,15 @@ def test_equal_candidates_are_chosen_by_chance_and_it_says_so() -> None:
     choice = PolicyChooser(Indifferent(), limits(), MotionNoise(), np.random.default_rng(0)).choose(3, knowledge())
     assert choice.plan is not None
     assert "chance" in choice.decision.reason
+
+
+def test_a_carry_that_was_felt_leaves_the_pose_better_known() -> None:
+    one, before = chooser("information"), 1e-6 * np.eye(3)
+    carried = Pose3(Rot3(), np.array([0.01, 0.0, 0.0]))
+    assert one.spread(before, HandMotion()) is before
+    felt = one.spread(before, HandMotion(carried, StepSigma(0.0005, 0.01)))
+    np.testing.assert_allclose(felt - before, np.diag([0.0005, 0.0005, 0.01]) ** 2)
+    assert (np.diag(one.spread(before, HandMotion(carried))) > np.diag(felt)).all()
 
 
 def touching(*fingers: str) -> Grasp:

@@ -17,6 +17,7 @@ from sessions.motion.probing.bounding_box import SIDES, BoundingBox
 from sessions.motion.probing.box_prober import BoxProber, ProbingSettings
 from sessions.motion.probing.raking import Raker
 from sessions.motion.safety import SafetySettings, SafetySupervisor
+from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
@@ -190,7 +191,7 @@ def test_box_is_carried_with_the_object() -> None:
     rule = HeuristicPlanner(PlanSettings(), np.random.default_rng(0))
     planner = Planner(NoEstimate(), rule, ExplorationSettings(), 2, HandShape(), 2)  # type: ignore[arg-type]
     planner.on_bounding_box(felt())
-    planner.on_carry(Pose3(Rot3(), np.array([0.05, 0.0, 0.0])))
+    planner.on_carry(HandMotion(Pose3(Rot3(), np.array([0.05, 0.0, 0.0]))))
     np.testing.assert_allclose(planner.centre_m, [0.05, 0.0], atol=1e-9)
 
 
