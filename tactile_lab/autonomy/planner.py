@@ -16,32 +16,24 @@ from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.motion.probing.room import Room
 from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.estimated_object import EstimatedObject
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
+from tactile_lab.autonomy.standing.beside import Beside
 from tactile_lab.autonomy.standing.candidate import SideReach
 from tactile_lab.autonomy.standing.empty_closings import EmptyClosings
-from tactile_lab.autonomy.standing.felt_object import FeltObject
-from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
+from tactile_lab.autonomy.standing.planner import Standstill
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, choose_grasp
 from tactile_lab.slam.doubt.assessment import Assessment
 from tactile_lab.slam.tactile_slam import TactileSlam
-
-_LANDING_m = 0.020
-"""An open fingertip's centre must stay this far from where one has landed on the object."""
 
 _UPWARD = 0.7
 """Least vertical part of the normal of a contact on the object's top."""
 
 _LEAST_BY_POLICY = 2
 """With fewer contacts than this the object is not where it was expected."""
-
-_BLOCKED_FROM_ABOVE = 2
-"""Approaches in a row; then, in space, the hand touches, or comes from the side."""
-
-HIGHEST_FROM_ABOVE_m = 0.08
-"""Taller objects are grasped from the side: the knuckles would land on them."""
 
 
 class Planner:
@@ -76,28 +68,19 @@ class Planner:
         self._slam, self._rule, self._exploration = slam, rule, exploration
         self._fixed_grasps, self._hand, self._dimension = fixed_grasps, hand, dimension
         self._object = EstimatedObject(slam, exploration, dimension)
-        self._landings_m: list[Array] = []
+        self._room = Room(hand)
         self._by_estimate = False
         self._doubted = False
         self._chooser, self._grasps = chooser, grasps
         self._here: GraspFrame | None = None
         self._carried = HandMotion()
-        self._box: BoundingBox | None = None
-        self._reach, self._touches = reach or SideReach(), touches
-        self._standing: StandingPlanner | None = None
-        """Plans if the palm cannot pass over the object, which then stays in place."""
-
-        self._for_once = False
-        """Whether it plans only one grasp or touch of an object that is otherwise grasped from above."""
-
+        self._touches = touches
+        self._beside = Beside(
+            rule, self._object, self._room, hand, reach or SideReach(), touches, surface=dimension == 3
+        )
+        self._standstill, self._empty = Standstill(), EmptyClosings()
         self._outline_m = 0.0
         """Where the hand had no room for an outline as low as it was planned: least height of its contacts now."""
-
-        self._blocked, self._standstill, self._empty = 0, Standstill(), EmptyClosings()
-        self.exhausted = ""
-        """Why no action is left, in words; empty while there is one."""
-        self.search: Search | None = None
-        """How to look for the object before anything else; None where it is believed where it was."""
 
         self.choice: Choice | None = None
         """The policy's decision about the next grasp; None if the policy was not asked."""
@@ -106,6 +89,16 @@ class Planner:
     def centre_m(self) -> Array:
         """Estimated centre of the object, world x, y."""
         return self._rule.centre_m
+
+    @property
+    def exhausted(self) -> str:
+        """Why no action is left, in words; empty while there is one."""
+        return self._beside.exhausted
+
+    @property
+    def search(self) -> Search | None:
+        """How to look for the object before anything else; None where it is believed where it was."""
+        return self._beside.search
 
     @property
     def settings(self) -> PlanSettings:
@@ -124,64 +117,27 @@ class Planner:
         return replace(plan, height_m=max(plan.height_m, self._outline_m))
 
     def _next(self, index: int) -> GraspPlan:
-        if (beside := self._beside(index)) is not None:
+        if (beside := self._beside.plan(index)) is not None:
             return beside
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
         if self._touches is not None and (again := self._empty.next(self._rule.fitting_heights_m)) is not None:
             self._by_estimate = False
             return again
-        if self._standstill.is_reached and (touch := self._standing_planner().touch()) is not None:
+        if self._standstill.is_reached and (touch := self._beside.touch()) is not None:
             self._standstill = Standstill()
             return touch
         if trusted and self._chooser is not None:
             return self._by_policy(index, self._chooser)
         chosen = self._best_by_estimate(index) if trusted else None
         self._by_estimate = chosen is not None
-        return replace(chosen or self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
-
-    def _beside(self, index: int) -> GraspPlan | None:
-        """A plan for an object that is too tall to pass over, or that blocked the descent; None for others.
-
-        After a blocked descent one touch is captured, if one is possible; then grasps come from above again. What is
-        wider than the hand opens stays where it stands.
-        """
-        if self._standing is None and self._dimension == 3 and self._blocked >= _BLOCKED_FROM_ABOVE:
-            self._standing = self._standing_planner()
-            self._for_once = not self._standing.felt.is_wide
-        if self._standing is None:
-            return None
-        self.search = self._standing.whereabouts.search()
-        if self.search is not None:
-            return self._rule.plan(index)
-        plan = self._standing.plan()
-        if plan is None and self._for_once:
-            self._return_above()
-            return None
-        self.exhausted = "" if plan is not None else self._standing.exhausted
-        return plan or self._rule.plan(index)
-
-    def _return_above(self) -> None:
-        self._standing, self._for_once, self._blocked = None, False, 0
-
-    def _standing_planner(self, box: BoundingBox | None = None, searches: int = 0) -> StandingPlanner:
-        """For the object as it was felt; without a box by the contacts of the estimate."""
-        felt = FeltObject(box) if box is not None else self._felt_object()
-        touches = self._touches if self._dimension == 3 else None
-        return StandingPlanner(felt, self._hand, self._rule.settings.yaw_window_rad, self._reach, touches, searches)
-
-    def _felt_object(self) -> FeltObject:
-        top_m = self._rule.top_m or HIGHEST_FROM_ABOVE_m
-        felt = FeltObject.around(self.centre_m, top_m, *self._object.contacts_world())
-        felt.on_landings(self._landings_m)
-        return felt
+        return replace(chosen or self._rule.plan(index, self._room.has), tap=self._rule.taps(index))
 
     def replan(self, index: int) -> GraspPlan:
         """Another plan for the same grasp, after a person has vetoed the last one."""
-        if self._standing is not None:
-            self._standing.on_blocked()
-            return self._beside(index) or self._rule.plan(index)
+        if self._beside.is_on:
+            return self._beside.replan(index)
         if self.choice is None or self.choice.decision.chosen is None:
-            plan = replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
+            plan = replace(self._rule.plan(index, self._room.has), tap=self._rule.taps(index))
             return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
         self.choice = self.choice.without_chosen()
         return self._plan_of(self.choice, index)
@@ -191,8 +147,8 @@ class Planner:
         knowledge = self._knowledge(index)
         if knowledge is None:
             self._by_estimate = False
-            return replace(self._rule.plan(index, self._has_room), tap=self._rule.taps(index))
-        self.choice = chooser.choose(index + 1, knowledge, self._has_room)
+            return replace(self._rule.plan(index, self._room.has), tap=self._rule.taps(index))
+        self.choice = chooser.choose(index + 1, knowledge, self._room.has)
         return self._plan_of(self.choice, index)
 
     def _plan_of(self, choice: Choice, index: int) -> GraspPlan:
@@ -201,7 +157,7 @@ class Planner:
         if plan is not None and self._chooser is not None and knowledge is not None:
             self._chooser.on_decision(choice, knowledge)
             return plan
-        rule = self._rule.plan(index, self._has_room)
+        rule = self._rule.plan(index, self._room.has)
         return replace(rule, tap=self._rule.taps(index), reason=f"{rule.reason}, as {choice.decision.reason}")
 
     def _knowledge(self, index: int) -> Knowledge | None:
@@ -225,29 +181,25 @@ class Planner:
             self._rule.top_m = box.top_m
         if not box.has_sides:
             return
-        self._box = box
+        self._room.box = box
         if box.is_found:
             self._rule.centre_m = box.centre_world_m
-        if box.top_m is not None and box.top_m > HIGHEST_FROM_ABOVE_m:
-            self._standing = self._standing_planner(box)
+        self._beside.begin(box)
 
     def on_found_again(self, box: BoundingBox) -> tuple[Change, str]:
         """Note where the object is that was looked for. Returns what has become of it, also in words."""
-        assert self._standing is not None
-        known, self.search = self._standing.whereabouts, None
-        change = known.judge(box)
-        words = known.in_words(change, box, self._standing.felt.grasps)
+        change, words, searches = self._beside.judge(box)
         if change is Change.FELL:
             self._begin_anew(box)
-        if change is not Change.STANDS and (box.top_m or 0.0) > HIGHEST_FROM_ABOVE_m:
-            self._standing = self._standing_planner(box, known.searches)
+        if change is not Change.STANDS:
+            self._beside.begin(box, searches)
         return change, words
 
     def _begin_anew(self, box: BoundingBox) -> None:
         """Forget what was known of an object that fell over."""
-        self._object.is_outdated, self._standstill, self._landings_m = True, Standstill(), []
-        self._standing, self._for_once, self._blocked, self._doubted = None, False, 0, False
-        self._empty, self._outline_m = EmptyClosings(), 0.0
+        self._object.is_outdated, self._doubted, self._room.landings_m = True, False, []
+        self._beside.return_above()
+        self._standstill, self._empty, self._outline_m = Standstill(), EmptyClosings(), 0.0
         if self._chooser is not None:
             self._chooser.begin_anew()
         self.on_bounding_box(box)
@@ -255,12 +207,10 @@ class Planner:
 
     def on_landings(self, points_world_m: list[Array]) -> None:
         """Note where fingertips landed on the object; used until the object is moved."""
-        self._landings_m += points_world_m
-        self._blocked += bool(points_world_m)
         if points_world_m:
+            self._room.on_landings(points_world_m)
             self._empty.on_blocked()
-        if self._standing is not None and points_world_m:
-            self._standing.on_blocked()
+            self._beside.on_landings()
 
     def _best_by_estimate(self, index: int) -> GraspPlan | None:
         known, expected = self._object.known_shape(), self._object.expected_pose()
@@ -272,34 +222,20 @@ class Planner:
             return closing(name, height_m, self._hand)
 
         return choose_grasp(
-            known, expected, settings.closings, table, settings.yaw_window_rad, self._exploration, self._has_room
+            known, expected, settings.closings, table, settings.yaw_window_rad, self._exploration, self._room.has
         )
-
-    def _has_room(self, plan: GraspPlan) -> bool:
-        if not self._landings_m and self._box is None:
-            return True
-        paths = closing(plan.closing, plan.height_m, self._hand).paths
-        open_m = np.array([plan.frame.pose.transformFrom(paths[f].centre_m(paths[f].valid[0])) for f in paths])
-        if self._box is not None and not self._box.is_clear(open_m[:, :2]):
-            return False
-        apart_m = open_m[:, None, :2] - np.array(self._landings_m).reshape(-1, 3)[None, :, :2]
-        return bool(np.linalg.norm(apart_m, axis=-1).min(initial=np.inf) >= _LANDING_m)
 
     # --- carrying ----------------------------------------------------------------------------------------------
 
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """Note a captured grasp. Returns how to carry the object now."""
-        self._blocked = 0
+        is_beside = self._beside.is_on
         if self._dimension == 2 and plan.height_m > max(self.settings.contour_heights_m):
             self._outline_m = plan.height_m
-        if self._standing is not None:
-            self._standing.on_grasp(grasp)
-            self._rule.centre_m = self._standing.middle_m
-        elif self._dimension == 3 and self._rule.top_m is not None:
+        self._beside.on_grasp(grasp)
+        if not is_beside and self._dimension == 3 and self._rule.top_m is not None:
             self._empty.on_grasp(grasp, plan)
-        if self._standing is not None or plan.only_touch:
-            if self._for_once:
-                self._return_above()
+        if is_beside or plan.only_touch:
             self._object.hand_motion, self._here = Pose3(), plan.frame
             return Reorientation(0.0, np.zeros(2))
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
@@ -324,14 +260,12 @@ class Planner:
         if knowledge is None or covariance is None:
             return None if self._chooser.may_leave else turn_rad
         knowledge = replace(knowledge, covariance=covariance)
-        return self._chooser.turn(plan.frame, knowledge, grasp, turn_rad, self._has_room)
+        return self._chooser.turn(plan.frame, knowledge, grasp, turn_rad, self._room.has)
 
     def on_carry(self, carried: HandMotion) -> None:
         """Note how the hand carried the object since the last grasp, and how well that is known."""
         self._carried, self._object.hand_motion, motion = carried, carried.world, planar(carried.world)
-        self._box = None if self._box is None else self._box.move(motion)
-        if carried.is_carry:
-            self._landings_m = []
+        self._room.on_carry(carried)
         if self._here is not None:
             pose = motion * Pose2(self._here.x_m, self._here.y_m, self._here.yaw_rad)
             self._here = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))
@@ -352,15 +286,13 @@ class Planner:
         self._object.is_outdated = False
         if self._chooser is not None and not is_placed:
             self._chooser.on_unplaced_grasp()
-        if self._standing is not None:
-            self._standing.on_estimate(is_placed, *self._object.contacts_world(), self._object.motion_world())
-            self._rule.centre_m = self._standing.middle_m
+        self._beside.on_estimate(is_placed)
         known, expected = self._object.known_shape(), self._object.expected_pose()
         if known is not None:
             self._standstill.note(known.explored)
-        trusted = index + 1 >= self._fixed_grasps and not self._doubted and self._standing is None
+        trusted = index + 1 >= self._fixed_grasps and not self._doubted and not self._beside.is_on
         if trusted and known is not None and expected is not None:
-            self._box = None
+            self._room.box = None
             self._rule.centre_m = np.asarray(expected.transformFrom(known.centre_m))
 
     def known_shape(self) -> KnownShape | None:
