@@ -148,7 +148,7 @@ class GraspCycle:
         s = self.settings
         self._motion.climb(self._above(), s.travel_m_s)
         self.fingers.open_for(self._table())
-        self._motion.move_base(self._above(), s.travel_m_s, s.turn_rad_s)
+        self._motion.move_base(self._motion.unwound(self._above()), s.travel_m_s, s.turn_rad_s)
         self._motion.tare(s.rest_s)
 
     def _above(self) -> Array:

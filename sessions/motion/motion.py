@@ -168,6 +168,17 @@ class Motion:
         mount_T_forearm = self.runtime.world_T_mount.inverse() * world_T_palm * STRAIGHT_WRIST.inverse()
         return np.asarray(mount_joints(mount_T_forearm, float(self._base_q[3])))
 
+    def unwound(self, q: Array) -> Array:
+        """The same place, shape (6,), with a yaw of three quarters of a turn at most, for a way at travel height.
+
+        Every yaw is the nearest of all equal ones, and a hand that goes around an object again and again would turn on
+        until the axis ends. Where it may turn all around, and holds nothing, it turns back.
+        """
+        middle = float(np.clip(self._base_q[3], -np.pi / 2, np.pi / 2))
+        back = np.zeros(len(q))
+        back[3] = 2 * np.pi * np.round((q[3] - middle) / (2 * np.pi))
+        return np.asarray(q - back)
+
     def set_base(self, q: Array) -> None:
         """New positioner target, shape (6,), metres and radians."""
         self._base_q = np.asarray(q, dtype=float)

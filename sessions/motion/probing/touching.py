@@ -227,7 +227,7 @@ class Toucher:
         above = motion.base_joints(frame, table, self._above_m(table), away_m)
         motion.climb(above, cycle.travel_m_s)
         motion.blend_fingers(table, pattern.progress, cycle.finger_rad_s, pattern.aside(table))
-        motion.move_base(above, *self._travel)
+        motion.move_base(motion.unwound(above), *self._travel)
         motion.tare(cycle.rest_s)
 
     def _approach(self, goal: Array, speed_m_s: float, *, is_careful: bool = False) -> bool:
