@@ -27,6 +27,8 @@ class EmptyClosings:
 
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> None:
         """Note what a grasp or a touch from above has met."""
+        if plan.only_touch and self._last is None:
+            return  # what a touch elsewhere misses is no reason to close there, or to tap
         met = grasp.contacts if plan.only_touch else grasp.touching
         self._last, self._count = (None, 0) if met else (plan, self._count + 1)
 

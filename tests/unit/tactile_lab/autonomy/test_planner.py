@@ -258,6 +258,13 @@ def test_fingers_that_met_nothing_close_at_another_height_before_the_top_is_tapp
     assert chooser.plan(3).reason in FROM_ABOVE
 
 
+def test_a_touch_that_met_nothing_is_neither_repeated_at_another_height_nor_followed_by_a_tap() -> None:
+    chooser = felt_on_top(0.07)
+    chooser.on_grasp(grasp_at("FF", "TH"), chooser.plan(0))
+    chooser.on_grasp(grasp_at(), replace(chooser.plan(1), only_touch=True))
+    assert chooser.plan(2).reason in FROM_ABOVE
+
+
 def test_a_wide_rim_above_a_waist_is_met_by_fingers_just_below_it() -> None:
     chooser = felt_on_top(0.07)
     chooser.on_grasp(grasp_at(), replace(chooser.plan(0), height_m=0.034))
