@@ -88,7 +88,7 @@ def test_motions_of_the_hand_between_grasps() -> None:
     poses = [Pose3(Rot3.Ypr(0.1 * n, 0.02 * n, 0.0), np.array([0.01 * n, -0.02 * n, 0.3])) for n in range(9)]
 
     def note() -> None:
-        told.append([odometry.grasp_count, odometry.is_holding, odometry.motion_world.matrix()[:3]])
+        told.append([odometry.grasp_count, odometry.is_holding, odometry.motion.world.matrix()[:3]])
 
     def take(pose: Pose3, carry: Carry | None = None) -> None:
         motion = odometry.take(pose, carry)
@@ -187,7 +187,7 @@ def test_a_session_of_fakes() -> None:
         "loads": seen.loads_N(),
         "dropped": [seen.touches.dropped, dict(seen.touches.drop_counts)],
         "counts": [seen.grasp_count, seen.is_holding, interpreter.clock.now_ns(), seen.hand_stamp_ns],
-        "motion": seen.hand_motion_world.matrix()[:3],
+        "motion": seen.hand_motion.world.matrix()[:3],
         "losses": dict(rig.runtime.losses),
         "cycles": vars(rig.runtime.counts),
         "calls": rig.calls,
