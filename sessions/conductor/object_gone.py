@@ -36,7 +36,7 @@ def blocked(approaches: int, landings_m: Sequence[Array]) -> str:
 
     Args:
         approaches: in a row that failed.
-        landings_m: where it landed on the object, world, shape (3,) each.
+        landings_m: where the hand landed on the object, world, shape (3,) each.
     """
     said = f"could not reach the table: {approaches} approaches were blocked"
     if not len(landings_m):

@@ -113,12 +113,12 @@ class Planner:
         After a grasp that the estimate had chosen and that missed the object with some fingers, one grasp follows the
         contacts alone.
         """
-        plan = self._next(index)
+        return self._beside.plan(index) or self._with_room_for_links(self._from_above(index))
+
+    def _with_room_for_links(self, plan: GraspPlan) -> GraspPlan:
         return replace(plan, height_m=max(plan.height_m, self._outline_m))
 
-    def _next(self, index: int) -> GraspPlan:
-        if (beside := self._beside.plan(index)) is not None:
-            return beside
+    def _from_above(self, index: int) -> GraspPlan:
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
         if self._touches is not None and (again := self._empty.next(self._rule.fitting_heights_m)) is not None:
             self._by_estimate = False
@@ -230,7 +230,7 @@ class Planner:
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """Note a captured grasp. Returns how to carry the object now."""
         is_beside = self._beside.is_on
-        if self._dimension == 2 and plan.height_m > max(self.settings.contour_heights_m):
+        if self._dimension == 2 and not is_beside and plan.height_m > max(self.settings.contour_heights_m):
             self._outline_m = plan.height_m
         self._beside.on_grasp(grasp)
         if not is_beside and self._dimension == 3 and self._rule.top_m is not None:

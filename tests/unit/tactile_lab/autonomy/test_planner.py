@@ -173,6 +173,16 @@ def test_an_outline_is_felt_where_the_hand_had_room_from_then_on() -> None:
     assert {chooser.plan(index).height_m for index in range(1, 5)} == {raised.height_m}
 
 
+def test_a_grasp_from_the_side_of_something_tall_does_not_raise_those_that_follow() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9)
+    sides_m = np.array([0.03, 0.03])
+    chooser.on_bounding_box(BoundingBox(Pose2(), -sides_m, sides_m, 0.0, 0.15, {}))
+    first = chooser.plan(0)
+    assert first.closing.endswith(("left", "right"))
+    chooser.on_grasp(grasp_at("FF", "TH"), replace(first, height_m=0.11))
+    assert chooser.plan(1).height_m < 0.11
+
+
 def test_a_surface_is_felt_at_all_heights_whatever_was_raised() -> None:
     chooser = planner(KnownSlam(None, None), fixed_grasps=9, dimension=3)
     raised = replace(chooser.plan(0), height_m=0.047)
