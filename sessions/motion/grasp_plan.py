@@ -45,6 +45,7 @@ class GraspPlan:
         only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
         places: where it touches that side, one after another.
         may_shift: where a fingertip lands the hand may try again a little aside.
+        may_rise: where only a link lands it may try again higher.
         is_gentle: fingertips press less than usual: what they hold leans easily.
     """
 
@@ -56,12 +57,13 @@ class GraspPlan:
     only_touch: bool = False
     places: tuple[TouchPlace, ...] = ()
     may_shift: bool = True
+    may_rise: bool = True
     is_gentle: bool = False
 
     def raised(self, by_m: float, highest_m: float) -> GraspPlan | None:
-        """The same grasp so much higher, in whole millimetres; None above ``highest_m``."""
+        """The same grasp so much higher, in whole millimetres; None above ``highest_m``, or where it may not be."""
         height_m = float(np.ceil(1e3 * (self.height_m + by_m)) / 1e3)
-        return replace(self, height_m=height_m) if height_m <= min(highest_m, HIGHEST_m) else None
+        return replace(self, height_m=height_m) if self.may_rise and height_m <= min(highest_m, HIGHEST_m) else None
 
     def as_plain(self, index: int) -> dict[str, Any]:
         """The plan of grasp number ``index``, from 0, as plain data for viewers; metres and radians on the table."""

@@ -34,6 +34,10 @@ _UPWARD = 0.7
 
 _LEAST_BY_POLICY = 2
 """With fewer contacts than this the object is not where it was expected."""
+_BLOCKED_AT_HEIGHT = 3
+"""So many approaches in a row must be blocked before an outline is felt higher: pinched near its top, an object is hard
+to lift.
+"""
 
 
 class Planner:
@@ -116,7 +120,9 @@ class Planner:
         return self._beside.plan(index) or self._with_room_for_links(self._from_above(index))
 
     def _with_room_for_links(self, plan: GraspPlan) -> GraspPlan:
-        return replace(plan, height_m=max(plan.height_m, self._outline_m))
+        """The plan at least as high as the outline is felt; higher only once other ways down to it were blocked."""
+        may_rise = self._dimension == 3 or self._beside.blocked >= _BLOCKED_AT_HEIGHT
+        return replace(plan, height_m=max(plan.height_m, self._outline_m), may_rise=may_rise)
 
     def _from_above(self, index: int) -> GraspPlan:
         trusted, self.choice = index >= self._fixed_grasps and not self._doubted, None
@@ -134,8 +140,9 @@ class Planner:
 
     def replan(self, index: int) -> GraspPlan:
         """Another plan for the same grasp, after a person has vetoed the last one."""
-        if self._beside.is_on:
-            return self._beside.replan(index)
+        return self._beside.replan(index) if self._beside.is_on else self._with_room_for_links(self._other(index))
+
+    def _other(self, index: int) -> GraspPlan:
         if self.choice is None or self.choice.decision.chosen is None:
             plan = replace(self._rule.plan(index, self._room.has), tap=self._rule.taps(index))
             return replace(plan, reason=f"{plan.reason}, as the last was vetoed")

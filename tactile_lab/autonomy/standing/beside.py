@@ -51,7 +51,9 @@ class Beside:
         self._rule, self._estimate, self._room = rule, estimate, room
         self._hand, self._reach, self._touches, self._surface = hand, reach, touches, surface
         self._planner: StandingPlanner | None = None
-        self._for_once, self._blocked = False, 0
+        self._for_once = False
+        self.blocked = 0
+        """Approaches in a row that were blocked."""
         self.exhausted = ""
         """Why no action is left, in words; empty while there is one."""
         self.search: Search | None = None
@@ -64,7 +66,7 @@ class Beside:
 
     def plan(self, index: int) -> GraspPlan | None:
         """The plan of grasp number ``index``; None where it comes from above."""
-        if self._planner is None and self._surface and self._blocked >= _BLOCKED_FROM_ABOVE:
+        if self._planner is None and self._surface and self.blocked >= _BLOCKED_FROM_ABOVE:
             self._planner = self._for_object()
             self._for_once = not self._planner.felt.is_wide
         if self._planner is None:
@@ -101,7 +103,7 @@ class Beside:
 
     def return_above(self) -> None:
         """Grasps come from above again."""
-        self._planner, self._for_once, self._blocked = None, False, 0
+        self._planner, self._for_once, self.blocked = None, False, 0
 
     def _for_object(self, box: BoundingBox | None = None, searches: int = 0) -> StandingPlanner:
         """For the object as it was felt; without a box by the contacts of the estimate."""
@@ -119,13 +121,13 @@ class Beside:
 
     def on_landings(self) -> None:
         """The way down was blocked."""
-        self._blocked += 1
+        self.blocked += 1
         if self._planner is not None:
             self._planner.on_blocked()
 
     def on_grasp(self, grasp: Grasp) -> None:
         """A grasp or touch was captured."""
-        self._blocked = 0
+        self.blocked = 0
         if self._planner is not None:
             self._planner.on_grasp(grasp)
             self._rule.centre_m = self._planner.middle_m

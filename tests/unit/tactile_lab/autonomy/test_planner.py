@@ -165,12 +165,30 @@ def test_rule_stands_in_where_nothing_is_known_or_all_is_lost(slam: KnownSlam) -
 
 def test_an_outline_is_felt_where_the_hand_had_room_from_then_on() -> None:
     chooser = planner(KnownSlam(None, None), fixed_grasps=9)
-    plan = chooser.plan(0)
+    plan = replace(chooser.plan(0), may_rise=True)
     raised = plan.raised(0.0121, np.inf)
     assert raised is not None
     assert raised.height_m == pytest.approx(plan.height_m + 0.013)
     chooser.on_grasp(grasp_at("FF", "TH"), raised)
     assert {chooser.plan(index).height_m for index in range(1, 5)} == {raised.height_m}
+
+
+def test_an_outline_is_felt_higher_only_where_other_ways_down_to_it_were_blocked() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9)
+    for _ in range(3):
+        plan = chooser.plan(0)
+        assert plan.raised(0.01, np.inf) is None
+        chooser.on_landings([np.array([0.0, 0.0, 0.05])])
+    assert chooser.plan(0).raised(0.01, np.inf) is not None
+    assert chooser.replan(0).raised(0.01, np.inf) is not None
+    chooser.on_grasp(grasp_at("FF", "TH"), plan)
+    assert chooser.plan(1).raised(0.01, np.inf) is None
+
+
+def test_after_a_veto_an_outline_is_felt_as_high_as_before() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9)
+    chooser.on_grasp(grasp_at("FF", "TH"), replace(chooser.plan(0), height_m=0.047))
+    assert chooser.replan(1).height_m == 0.047
 
 
 def test_a_grasp_from_the_side_of_something_tall_does_not_raise_those_that_follow() -> None:
