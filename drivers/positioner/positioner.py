@@ -23,6 +23,8 @@ _SHORTEST_STEP_s = 1e-6
 
 _BEGINS_ANEW = 1000
 """A status that answers a command so long ago is none that came late: the count began anew."""
+_ROUNDING = np.repeat([0.001, 0.005], 3)
+"""A target no farther beyond a range is clamped to it; metres and radians."""
 
 
 class Positioner:
@@ -107,13 +109,26 @@ class Positioner:
         """Set where to go, shape (6,), metres and radians, clamped to the ranges. Without effect while stopped.
 
         Raises:
-            DeviceError: not six finite numbers.
+            DeviceError: not six finite numbers; or beyond a range by more than rounding, which would leave the hand
+                elsewhere than it was sent.
         """
         target = np.asarray(q, dtype=float)
         if target.shape != (6,) or not np.isfinite(target).all():
             raise DeviceError("a target is not six finite numbers", where=self._transport.name, hint="Check the path")
+        self._check_range(target)
         if not self._stopped and self._fault is None:
             self._target = np.minimum(np.maximum(target, self._range[0]), self._range[1])
+
+    def _check_range(self, target: Array) -> None:
+        beyond = np.maximum(self._range[0] - target, target - self._range[1])
+        if (beyond > _ROUNDING).any():
+            at = int(np.argmax(beyond))
+            low, high = self._range[:, at]
+            raise DeviceError(
+                f"{AXES[at]} was sent to {target[at]:.2f}, and goes from {low:.2f} to {high:.2f}",
+                where=self._transport.name,
+                hint="Move the object to the middle of the workspace, or correct the ranges in the rig file",
+            )
 
     def stop(self) -> None:
         """Stay here until :meth:`resume`. Never raises."""

@@ -20,7 +20,7 @@ class PositionerSettings(StrictModel):
     Attributes:
         speed_m_s: largest speed of each linear axis.
         speed_rad_s: largest speed of each rotation.
-        ranges: lower and upper end of each axis, metres and radians; targets are clamped to them.
+        ranges: lower and upper end of each axis, metres and radians; a target beyond them is refused.
         lost_limit: the positioner stops after this many cycles in a row without a status.
         following_m: a linear axis this far from where it was sent stops the positioner: something is in its way.
         following_rad: the same for the rotations.

@@ -230,9 +230,22 @@ def test_a_pause_of_the_host_does_not_make_a_long_step(rig: Rig) -> None:
 
 
 def test_targets_are_clamped_to_the_ranges(rig: Rig) -> None:
-    rig.device.set_target(np.array([9.0, 0.0, -9.0, 0.0, 0.5, 0.0]))
+    rig.device.set_target(np.array([1.0005, 0.0, -0.3005, 0.0, 0.5, 0.0]))
     rig.run(400)
     np.testing.assert_allclose(rig.base.q[[0, 2]], [1.0, -0.3])
+
+
+@pytest.mark.parametrize(("axis", "value", "words"), [(0, 1.1, "x was sent to 1.10"), (3, -13.0, "yaw was sent to")])
+def test_a_target_beyond_a_range_is_refused_and_the_positioner_stays(
+    rig: Rig, axis: int, value: float, words: str
+) -> None:
+    start = rig.base.q.copy()
+    target = start.copy()
+    target[axis] = value
+    with pytest.raises(DeviceError, match=words):
+        rig.device.set_target(target)
+    rig.run(20)
+    np.testing.assert_allclose(rig.base.q, start)
 
 
 @pytest.mark.parametrize("bad", [np.zeros(5), np.array([0, 0, np.nan, 0, 0, 0]), np.array([0, 0, np.inf, 0, 0, 0])])
