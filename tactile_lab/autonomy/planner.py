@@ -237,7 +237,8 @@ class Planner:
     def on_grasp(self, grasp: Grasp, plan: GraspPlan) -> Reorientation:
         """Note a captured grasp. Returns how to carry the object now."""
         is_beside = self._beside.is_on
-        if self._dimension == 2 and not is_beside and plan.height_m > max(self.settings.contour_heights_m):
+        is_raised = not is_beside and plan.height_m > max(self.settings.contour_heights_m)
+        if self._dimension == 2 and is_raised and grasp.touching:
             self._outline_m = plan.height_m
         self._beside.on_grasp(grasp)
         if not is_beside and self._dimension == 3 and self._rule.top_m is not None:

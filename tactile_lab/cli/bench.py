@@ -19,6 +19,7 @@ class Part(StrEnum):
     """Benchmarks that can be run separately."""
 
     PATHS = "paths"
+    CARRY = "carry"
     CAMERA = "camera"
     ETHERCAT = "ethercat"
     LOAD = "load"
@@ -31,6 +32,7 @@ Table: TypeAlias = tuple[str, Sequence[str], Sequence[Sequence[str]]]
 """Title, header and rows."""
 _PAGES = {
     Part.PATHS: ("speed", "Time taken by the expensive parts of a step."),
+    Part.CARRY: ("speed-carry", "Processor time of odometry in the hand for each carry, with its checks for slip."),
     Part.CAMERA: ("speed-camera", "Time taken by marker detection, in its own process."),
     Part.ETHERCAT: (
         "hand-on-ethercat",
@@ -48,7 +50,8 @@ def bench(
     only: Annotated[
         Part,
         typer.Option(
-            help="paths: the expensive parts of a step; start: --help and the first cycle of a session; "
+            help="paths: the expensive parts of a step; carry: odometry in the hand; "
+            "start: --help and the first cycle of a session; "
             "camera: marker detection in its own process; "
             "ethercat: both masters on the emulated hand, and how they recover; "
             "load: five force sensors at 7 kHz and the hand at 1 kHz; "
@@ -90,8 +93,10 @@ def bench(
             tables = _start(as_json)
         case Part.PATHS:
             tables = _paths(as_json)
+        case Part.CARRY:
+            tables = _carry(as_json)
     if store:
-        timed = "" if only in (Part.PATHS, Part.START, Part.MEMORY) else f" --seconds {seconds:g}"
+        timed = "" if only in (Part.PATHS, Part.CARRY, Part.START, Part.MEMORY) else f" --seconds {seconds:g}"
         command = "tactile-lab bench" if only is Part.PATHS else f"tactile-lab bench --only {only}{timed}"
         _store(docs, only, command, tables)
 
@@ -119,6 +124,12 @@ def _paths(as_json: bool) -> list[Table]:
     from tactile_lab.benchmarks.step_times import step_table
 
     return _tell_tables([start_table(), *run_benchmarks(), step_table(), decision_table()], as_json)
+
+
+def _carry(as_json: bool) -> list[Table]:
+    from tactile_lab.benchmarks.carry_times import carry_table
+
+    return _tell_tables([carry_table()], as_json)
 
 
 def _start(as_json: bool) -> list[Table]:

@@ -5,7 +5,7 @@ The fixed rule plans the grasps, and every object is carried after each, so that
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -141,18 +141,31 @@ class CarryWatch(NullProgress):
 
 
 def watch_carries(
-    object_name: str, seed: int, grasps: int, mass_kg: float = MASS_kg, weighings: int = 0
+    object_name: str,
+    seed: int,
+    grasps: int,
+    mass_kg: float = MASS_kg,
+    weighings: int = 0,
+    make_watch: Callable[[SimulatedWorld, RigRuntime, int], CarryWatch] = CarryWatch,
 ) -> tuple[SessionOutcome, CarryWatch]:
     """A session of the fixed rule, in which the object is carried after every grasp but the last.
 
     Scans lie: one that stands is grasped from the side, and such a hand carries nothing.
+
+    Args:
+        object_name: of the catalogue, or a scan.
+        seed: of the session.
+        grasps: their number.
+        mass_kg: of the object.
+        weighings: how often it may be weighed.
+        make_watch: makes what keeps the truth, from world, runtime and seed.
 
     Raises ConfigurationError: the object is a scan, and the scans are not on this machine.
     """
     rig, is_scan = _rig_with(mass_kg), object_name.startswith(YCB_PREFIX)
     world = simulated_world(rig, seed, _lying(object_name) if is_scan else object_name)
     runtime = build_runtime(rig, world, NullRecorder())
-    watch = CarryWatch(world, runtime, seed)
+    watch = make_watch(world, runtime, seed)
     runtime.observer.interpreter.listener = watch.on_sample
     slam = TactileSlam(slam_settings("odometry", 2, rig.description.motion), seed)
     settings = _by_rule(rig, grasps, weighings, top=is_scan)

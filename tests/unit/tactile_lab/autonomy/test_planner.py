@@ -191,6 +191,13 @@ def test_after_a_veto_an_outline_is_felt_as_high_as_before() -> None:
     assert chooser.replan(1).height_m == 0.047
 
 
+def test_a_grasp_that_closed_above_the_object_does_not_raise_those_that_follow() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9)
+    plan = chooser.plan(0)
+    chooser.on_grasp(grasp_at(), replace(plan, height_m=0.119))
+    assert chooser.plan(1).height_m == plan.height_m
+
+
 def test_a_grasp_from_the_side_of_something_tall_does_not_raise_those_that_follow() -> None:
     chooser = planner(KnownSlam(None, None), fixed_grasps=9)
     sides_m = np.array([0.03, 0.03])
