@@ -23,9 +23,6 @@ from sessions.motion.travel import top_at_most_m
 _LINKS_NEAR_m = 0.005
 """Above a top that is known on: from there links may land on it."""
 
-_ALIKE_m = 0.01
-"""Landings of links that are so near each other in height were on the same thing."""
-
 
 @dataclass(frozen=True)
 class Place:
@@ -118,15 +115,6 @@ class Arrival:
                 self.note(place, self._guard)
                 return False
         return True
-
-    @property
-    def is_believed(self) -> bool:
-        """Whether the links that landed last did so on the object: a motor's noise looks like that once in hundreds of
-        descents, but neither where something can be nor twice at one height.
-        """
-        *before, (_, _, height_m) = self.landings_world_m
-        is_possible = height_m <= top_at_most_m(self._motion) + _LINKS_NEAR_m
-        return is_possible or any(abs(height_m - other[2]) < _ALIKE_m for other in before)
 
     # --- landings ----------------------------------------------------------------------------------------------
 

@@ -116,12 +116,9 @@ class GraspCycle:
 
     def _otherwise(self, plan: GraspPlan, hit: tuple[str, ...], landed: set[str], up_m: float) -> GraspPlan | None:
         """The plan after a landing ``up_m`` above the grasp: where only links did, which would land again a little
-        aside, so much higher, or the same if that cannot be; otherwise as :func:`evade` says. None where that may not
-        be.
+        aside, so much higher; otherwise as :func:`evade` says. None where that may not be.
         """
         if not (fingers := [finger for finger in hit if finger in self._hand.form.fingers]):
-            if not self._arrival.is_believed:
-                return plan
             top_m = self._motion.tallest_m
             return self.plan.raised(up_m, np.inf if top_m is None else top_m - _BELOW_TOP_m)
         if not plan.may_shift:

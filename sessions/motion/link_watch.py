@@ -48,7 +48,7 @@ class LinkWatch:
     """Compares the motors' strain gauges with what they showed since the motion began.
 
     What is usual are the median and the median deviation of the newest readings: a push that grows slowly, or a jerk,
-    hardly changes them.
+    hardly changes them. At the beginning of a motion the motors' noise in the one before counts, too.
 
     Args:
         is_wrist: which motors move the wrist, shape (20,).
@@ -57,17 +57,22 @@ class LinkWatch:
     def __init__(self, is_wrist: NDArray[np.bool_]) -> None:
         self._is_wrist = is_wrist
         self._sigmas, self._counts, self._in_a_row = np.where(is_wrist, *np.array([_STILL_WRIST, _STILL])[..., None])
+        self._readings, self._compared = np.empty((len(is_wrist), _COMPARED)), 0
+        """The newest ones of each motor, in no order, and how many there have been."""
+        self._sigma_before = np.zeros(len(is_wrist))
+        """Of the last motion that was long enough to tell it."""
         self.restart()
 
     def restart(self) -> None:
         """A new even motion begins."""
+        if self._compared >= _COMPARED:
+            self._sigma_before = self._usual()[1]
         self._began_ns: int | None = None
         self._newest: tuple[int, Array] | None = None
         self._heard_ns: int | None = None
         self._since: list[Array] = []
         """What was heard since the newest reading."""
-        self._readings, self._compared = np.empty((len(self._counts), _COMPARED)), 0
-        """The newest ones of each motor, in no order, and how many there have been."""
+        self._compared = 0
         self._far, self._leaning, self._both, self._off = 0, 0, 0, np.zeros(len(self._counts), dtype=int)
         """Readings in a row in which any motor is far off, a finger's is a little, or both of the wrist are; and for
         each motor, in which it is off at all."""
@@ -114,9 +119,9 @@ class LinkWatch:
         self._compared += 1
 
     def _judge(self, torques: Array, is_new: NDArray[np.bool_]) -> None:
-        known = self._readings[:, : self._compared]
-        usual = _medians(known)
-        sigma = _MAD_TO_SIGMA * _medians(np.abs(known - usual[:, None]))
+        usual, sigma = self._usual()
+        if self._compared < _COMPARED:  # ten readings may happen to be alike
+            sigma = np.maximum(sigma, self._sigma_before)
         off = np.abs(torques - usual)
         far = off > np.maximum(_LEAST_COUNTS, _SIGMAS * sigma)
         self._far = self._far + bool(is_new[far].any()) if far.any() else 0
@@ -126,6 +131,12 @@ class LinkWatch:
         self._both = self._both + bool(is_new[both].any()) if np.count_nonzero(both) > 1 else 0
         is_off = off > np.maximum(self._counts, self._sigmas * sigma)
         self._off = np.where(is_off, self._off + is_new, 0)
+
+    def _usual(self) -> tuple[Array, Array]:
+        """Median of each motor's readings, and their standard deviation by the median one; shape (20,) each."""
+        known = self._readings[:, : self._compared]
+        usual = _medians(known)
+        return usual, _MAD_TO_SIGMA * _medians(np.abs(known - usual[:, None]))
 
 
 def _medians(rows: Array) -> Array:

@@ -39,25 +39,3 @@ def slow_from_m(top_m: float | None) -> float:
 def test_links_come_down_slowly_from_the_top_or_from_as_high_as_an_unknown_one_can_be(top_m: float | None) -> None:
     expected_m = (PASSED_OVER_m if top_m is None else top_m) + 0.005 - lowest_inside_m(PLAN.closing, 0.018, TIP)
     assert slow_from_m(top_m) == pytest.approx(max(0.0, expected_m), abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("top_m", "landed_m", "believed"),
-    [
-        (None, (0.05,), True),
-        (None, (0.128,), False),
-        (None, (0.128, 0.051), True),
-        (None, (0.128, 0.101), False),
-        (None, (0.128, 0.122), True),
-        (0.11, (0.11,), True),
-        (0.05, (0.07,), False),
-    ],
-)
-def test_links_that_land_where_nothing_can_be_are_believed_the_second_time(
-    top_m: float | None, landed_m: tuple[float, ...], believed: bool
-) -> None:
-    _, motion = grasp_cycle(DiscWorld(None, lambda world: None))
-    motion.tallest_m = top_m
-    arrival = Arrival(motion, SETTINGS, TIP)
-    arrival.landings_world_m = [np.array([0.0, 0.0, height_m]) for height_m in landed_m]
-    assert arrival.is_believed == believed

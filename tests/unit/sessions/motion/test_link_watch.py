@@ -37,6 +37,25 @@ def test_a_push_is_told_in_its_second_reading() -> None:
     assert cycles_until_touched(400.0, 200) == 201
 
 
+def test_the_noise_of_the_motion_before_counts_where_the_first_readings_of_this_one_are_alike() -> None:
+    def alarms(watch: LinkWatch) -> int:
+        watch.restart()
+        alike = [np.zeros(20), np.full(20, 2.0)] * 40
+        noise = [np.full(20, 40.0 + number) for number in range(4)]
+        told = 0
+        for number, torques in enumerate(alike + noise):
+            watch.take(torques, number * CYCLE_ns)
+            told += bool(watch.pushed.any())
+        return told
+
+    rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
+    assert alarms(watch) > 0
+    watch.restart()
+    for number in range(300):
+        watch.take(20.0 * rng.standard_normal(20), number * CYCLE_ns)
+    assert alarms(watch) == 0
+
+
 def test_a_lone_jerk_and_the_jerk_of_starting_are_no_touch() -> None:
     rng, watch = np.random.default_rng(0), LinkWatch(WRIST)
     pushes = [900.0 if cycle < 20 or cycle == 100 else 0.0 for cycle in range(200)]
