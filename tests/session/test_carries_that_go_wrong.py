@@ -37,7 +37,6 @@ def brisk_way(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 def carry_with(
     interfere: Interfere,
-    monkeypatch: pytest.MonkeyPatch,
     shape: str = "box-10x6x4",
     seed: int = SEED,
     lifts: bool = False,
@@ -63,8 +62,7 @@ def carry_with(
                 self.cycles += 1
                 interfere(self._world.plant, self.cycles)
 
-    monkeypatch.setattr(carried_objects, "CarryWatch", Interfering)
-    return watch_carries(shape, seed, 2, LIGHT_kg if lifts else MASS_kg, int(lifts))
+    return watch_carries(shape, seed, 2, LIGHT_kg if lifts else MASS_kg, int(lifts), make_watch=Interfering)
 
 
 def only_carry(outcome: SessionOutcome, watch: CarryWatch) -> tuple[WatchedCarry, Carry]:
@@ -131,17 +129,15 @@ def tip_over(plant: Plant, cycle: int) -> None:
     ],
 )
 def test_what_happens_to_the_object_is_told_and_the_noise_holds_it(
-    monkeypatch: pytest.MonkeyPatch, interfere: Interfere, shape: str, seed: int, words: str
+    interfere: Interfere, shape: str, seed: int, words: str
 ) -> None:
-    outcome, watch = carry_with(interfere, monkeypatch, shape, seed)
+    outcome, watch = carry_with(interfere, shape, seed)
     found, felt = only_carry(outcome, watch)
     assert any(words in told for told in watch.told)
     assert np.abs(sigmas_off(found, felt)).max() < 3.0
 
 
-def test_an_object_that_is_dropped_from_a_height_is_told_and_the_noise_holds_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_an_object_that_is_dropped_from_a_height_is_told_and_the_noise_holds_it() -> None:
     heights_m: list[float] = []
 
     def drop(plant: Plant, cycle: int) -> None:
@@ -149,7 +145,7 @@ def test_an_object_that_is_dropped_from_a_height_is_told_and_the_noise_holds_it(
         if heights_m[-1] > heights_m[0] + HIGH_m:
             lift_off(plant, set(FINGERS))
 
-    outcome, watch = carry_with(drop, monkeypatch, lifts=True)
+    outcome, watch = carry_with(drop, lifts=True)
     found, felt = only_carry(outcome, watch)
     assert max(heights_m) > heights_m[0] + HIGH_m
     assert any("it slipped out of the fingers" in told for told in watch.told)
@@ -165,7 +161,7 @@ def overload(monkeypatch: pytest.MonkeyPatch, cycles: Callable[[int], bool]) -> 
         extra[0, 2] = 50.0 if cycles(cycle) else 0.0
 
     monkeypatch.setattr(Plant, "wrenches", property(lambda plant: measured.fget(plant) + extra))
-    return carry_with(load, monkeypatch)
+    return carry_with(load)
 
 
 def test_a_sensor_that_saturates_now_and_then_is_named_and_the_noise_holds_the_truth(
