@@ -9,7 +9,7 @@ from tactile_lab.benchmarks.carry_times import carry_table
 
 @pytest.mark.long
 def test_every_carry_is_timed_with_its_checks() -> None:
-    carry, checks, both, largest = carry_table(("cylinder",), grasps=2).timings
-    assert carry.repeats == 1
-    assert both.ms == pytest.approx(carry.ms + checks.ms)
-    assert largest.ms == both.ms
+    carry, longest_carry, checks, longest_checks = carry_table(("cylinder",), grasps=2).timings
+    assert carry.repeats == checks.repeats == 1
+    assert 0 < carry.ms == longest_carry.ms
+    assert 0 < checks.ms == longest_checks.ms
