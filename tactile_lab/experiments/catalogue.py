@@ -35,6 +35,7 @@ EXPERIMENTS: Mapping[str, Experiment] = {
         solids.METHODS_6DOF,
         ablation.ABLATION,
         consistency.CONSISTENCY,
+        planar.FELT_2D,
         planar.CONTOUR_LIMIT,
         planar.RANDOM_CONTACTS,
         thesis_figures.FIGURE_2_7,

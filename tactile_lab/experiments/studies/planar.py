@@ -18,6 +18,8 @@ from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, condition, cu
 METHODS = ("known-pose", "joint", "particle", "icp", "thesis-pf", "thesis-pf-graph", "odometry")
 PLANAR_SHAPES = ("rectangle", "triangle", "ellipse", "L", "hexagon", "trapezoid", "pentagon", "stadium")
 PLANAR_GRASPS = 16
+FELT_NOISE = 10
+"""Motion noise, percent, that odometry in the hand stays below: 1 mm and 2 degrees a step."""
 
 
 def _methods_in_plane(grasps: int) -> list[Setting]:
@@ -26,6 +28,12 @@ def _methods_in_plane(grasps: int) -> list[Setting]:
         for noise, outliers in ((100, 0), (50, 0), (100, 10))
         for setting in grid(noise=[noise], outliers=[outliers], shape=PLANAR_SHAPES, method=METHODS, grasps=[grasps])
     ]
+
+
+def _felt_in_plane(grasps: int) -> list[Setting]:
+    return grid(
+        noise=[FELT_NOISE], outliers=[0, 10], shape=PLANAR_SHAPES, method=("known-pose", "joint"), grasps=[grasps]
+    )
 
 
 def _limits_in_plane(grasps: int) -> list[Setting]:
@@ -37,6 +45,17 @@ METHODS_2D = Experiment(
     "methods-2d",
     "All methods on all planar shapes, at 100 % and 50 % motion noise and with 10 % outliers.",
     _methods_in_plane,
+    tracking_runs.track_in_plane,
+    TRACKING_COLUMNS,
+    ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", condition),
+    pooled=("shape",),
+    grasps=PLANAR_GRASPS,
+)
+
+FELT_2D = Experiment(
+    "felt-2d",
+    "Planar shapes at 10 % motion noise, which odometry in the hand stays below.",
+    _felt_in_plane,
     tracking_runs.track_in_plane,
     TRACKING_COLUMNS,
     ranges("method", HAUSDORFF_LABEL, "hausdorff_mm", condition),

@@ -19,7 +19,7 @@ from tactile_lab.experiments.studies.columns import (
     STEP,
     TRACKING_COLUMNS,
 )
-from tactile_lab.experiments.studies.planar import METHODS
+from tactile_lab.experiments.studies.planar import FELT_NOISE, METHODS
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
 
 FACETED_SOLIDS = ("box-12x6x6", "triangular-prism", "hexagonal-prism", "l-block")
@@ -27,8 +27,6 @@ CURVED_SOLIDS = ("ellipsoid", "cylinder", "sphere", "mug", "bottle")
 SCANNED_SOLIDS = tuple(YCB_PREFIX + name for name in YCB_NAMES)
 EVERYDAY_SCANS = tuple(YCB_PREFIX + name for name in (*YCB_NAMES, *MORE_YCB_NAMES))
 SPATIAL_GRASPS = 24
-FELT_NOISE = 10
-"""Motion noise, percent, that odometry in the hand stays below: 1 mm and 2 degrees a step."""
 
 
 def scans_left_out(scans: tuple[str, ...] = SCANNED_SOLIDS) -> str:

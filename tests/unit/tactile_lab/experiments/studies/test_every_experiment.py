@@ -15,6 +15,7 @@ from tactile_lab.experiments.reporting import write_report
 
 TINY: dict[str, tuple[dict[str, list[str]], int | None]] = {
     "methods-2d": ({"shape": ["rectangle"], "noise": ["50"], "method": ["known-pose", "odometry", "joint"]}, 4),
+    "felt-2d": ({"shape": ["rectangle"], "outliers": ["0"]}, 4),
     "contour-limit": ({"shape": ["L"], "noise": ["50"]}, 4),
     "methods-3d": ({"shape": ["l-block"], "method": ["known-pose", "odometry"]}, 4),
     "everyday-3d": ({"shape": ["wedge"], "method": ["known-pose"]}, 4),
