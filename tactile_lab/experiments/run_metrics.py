@@ -32,12 +32,16 @@ from tactile_lab.evaluation.truth.rotational_symmetry import (
 from tactile_lab.experiments.data.planar_data import PlanarGrasps
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
+from tactile_lab.slam.doubt.sizes import sizes
 from tactile_lab.slam.doubt.symmetry import Symmetry
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
 from tactile_lab.slam.shape.metrics.metrics import ShapeErrors, contour_errors, mesh_errors
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, distances_to_polygon
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+
+NO_SIZES: dict[str, list[float]] = {"size_z": [], "size_off_mm": []}
+"""Of a result without a shape, or one that does not stand on a table."""
 
 NO_SHAPE: dict[str, Any] = {"hausdorff_mm": None, "mean_mm": None, "iou": None, "within_2_sigma": None}
 
@@ -137,4 +141,25 @@ def _shape_figures(errors: ShapeErrors, covered: float, closed: bool, judged: Su
         "surface_inside": list(judged.inside),
         "surface_log_score": judged.log_score,
         "surface_signed_mm": judged.signed_mm,
+    }
+
+
+def size_figures(shape: Contour | SurfaceMesh | None, true_points_m: Array) -> dict[str, Any]:
+    """Errors of the sizes of which both ends were touched: in stated standard deviations, and without sign in mm.
+
+    Args:
+        shape: as estimated; None if nothing is known.
+        true_points_m: of the true outline, shape (n, 2), or the vertices of the true surface, shape (n, 3), z up.
+    """
+    if shape is None:
+        return NO_SIZES
+    points_m = shape.points_m if isinstance(shape, Contour) else shape.vertices
+    stated = sizes(points_m, shape.sigma_m, shape.known)
+    pairs = [
+        (size.whole, true.whole) for size, true in zip(stated, sizes(true_points_m), strict=True) if not size.is_guess
+    ]
+    off_m = [found.length_m - true.length_m for found, true in pairs]
+    return {
+        "size_z": [error_m / found.sigma_m for error_m, (found, _) in zip(off_m, pairs, strict=True)],
+        "size_off_mm": [1e3 * abs(error_m) for error_m in off_m],
     }

@@ -23,8 +23,8 @@ from tactile_lab.experiments.data.sensing import (
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
-from tactile_lab.experiments.run_metrics import slam_figures
-from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, SURFACE_INSIDE
+from tactile_lab.experiments.run_metrics import NO_SIZES, size_figures, slam_figures
+from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, SIZES_INSIDE, SURFACE_INSIDE
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
@@ -75,6 +75,7 @@ def assessed_run(cell: Cell) -> dict[str, Any]:
     told = result.status != "complete"
     return {
         **figures,
+        **_sizes(data, result),
         "known_share": result.known_share,
         "doubts": [doubt.name for doubt in result.doubts],
         "off": int(off),
@@ -128,6 +129,14 @@ def _far_share(data: SimulatedGrasps, result: SlamResult) -> float:
     return float(np.mean(np.abs(errors_m) > _FAR_SIGMAS * sigma_m))
 
 
+def _sizes(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
+    if isinstance(data, PlanarGrasps):
+        return size_figures(result.contour, data.outline_m)
+    if isinstance(data, SpatialGrasps) and all(map(stands, data.world_T_body)):
+        return size_figures(result.mesh, np.asarray(data.mesh.vertices))
+    return NO_SIZES
+
+
 def _where(cell: Cell) -> str:
     if cell["family"] == HELD:
         return "held free"
@@ -148,6 +157,7 @@ CONSISTENCY = Experiment(
         POSES_INSIDE,
         Column("in the common frame", "common_poses_inside", 0, kind="shares"),
         SURFACE_INSIDE,
+        SIZES_INSIDE,
         Column("touched", "known_share", 0, kind="percent"),
         Column("off by 5 mm or 5 sigma", "off", 0, kind="sum"),
         Column("told, of those off", "off_told", 0, kind="sum"),

@@ -6,7 +6,7 @@ from tactile_lab.experiments.cells import Cell, Setting
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.studies import everyday_sessions
-from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE, REGISTRATION
+from tactile_lab.experiments.studies.columns import HAUSDORFF, MEAN_DISTANCE, REGISTRATION, SIZES_INSIDE
 from tactile_lab.experiments.studies.plots import HAUSDORFF_LABEL, ranges
 from tactile_lab.experiments.studies.solids import scans_left_out
 
@@ -61,6 +61,7 @@ EVERYDAY_OBJECTS = Experiment(
         Column("share in reach known to 5 mm", "known_share", 0, kind="percent"),
         Column("Hausdorff in reach, mm", "reach_hausdorff_mm"),
         REGISTRATION,
+        SIZES_INSIDE,
         Column("simulated minutes", "minutes", 1, kind="median"),
         Column("processor minutes", "cpu_minutes", 1, kind="median"),
     ),

@@ -39,7 +39,7 @@ from tactile_lab.experiments.data.solids import MORE_YCB_NAMES, YCB_NAMES, YCB_P
 from tactile_lab.experiments.data.true_surface import true_outline
 from tactile_lab.experiments.reach.reachable import ANY_YAW_rad
 from tactile_lab.experiments.reach.reached_metrics import reach_figures
-from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
+from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures, size_figures
 from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.experiments.touched_metrics import NOTHING_TOUCHED, TouchedObject, touched_figures
 from tactile_lab.rigs.build import build_runtime, simulated_world
@@ -173,13 +173,21 @@ def judge_model(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch, 
     """The model against the truth: everywhere, and in space also over what was touched, with a picture's lines."""
     seen = _as_it_lies(result, grasps, watch)
     mesh, truth, done = seen.mesh, seen.world_T_body, seen.grasps
-    shape = contour_figures(result.contour, true_outline(mesh)) if dimension == 2 else mesh_figures(result.mesh, mesh)
-    figures = {**shape, "registration_mm": registered_mm(seen, dimension) if done else None, **NOTHING_TOUCHED}
+    registration_mm = registered_mm(seen, dimension) if done else None
+    shape = _shape_figures(result, mesh, dimension)
+    figures = {**shape, "registration_mm": registration_mm, **NOTHING_TOUCHED}
     if dimension == 3:
         figures |= reach_figures(result.mesh, mesh, _yaws_rad(truth))
     if dimension == 3 and any(grasp.contacts for grasp in done):
         return {**figures, **touched_figures(seen, result), **_picture(result, seen)}
     return figures
+
+
+def _shape_figures(result: SlamResult, mesh: trimesh.Trimesh, dimension: int) -> dict[str, Any]:
+    if dimension == 2:
+        outline_m = true_outline(mesh)
+        return contour_figures(result.contour, outline_m) | size_figures(result.contour, outline_m)
+    return mesh_figures(result.mesh, mesh) | size_figures(result.mesh, np.asarray(mesh.vertices))
 
 
 @dataclass(frozen=True)

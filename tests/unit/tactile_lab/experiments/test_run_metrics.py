@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tactile_lab.experiments.data.outlines import OUTLINES_m
 from tactile_lab.experiments.data.solids import solid
-from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
+from tactile_lab.experiments.run_metrics import NO_SIZES, contour_figures, mesh_figures, size_figures
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 
 
@@ -21,3 +22,15 @@ def test_the_truth_itself_has_no_error_and_is_covered() -> None:
     surface = SurfaceMesh(np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64), sigma, normals, True)
     assert mesh_figures(surface, mesh)["hausdorff_mm"] < 0.3
     assert mesh_figures(None, mesh)["hausdorff_mm"] is None
+
+
+def test_sizes_are_judged_by_their_own_sigma_where_both_ends_were_touched() -> None:
+    true_m = np.array([[0.0, 0.0], [0.10, 0.0], [0.10, 0.06], [0.0, 0.06]])
+    found_m, sigma_m = true_m * [1.01, 1.0], np.full(4, 0.001)
+    known = np.array([True, True, True, False])
+    found = size_figures(Contour(found_m, sigma_m, is_closed=True, known=known), true_m)
+    assert found["size_off_mm"] == pytest.approx([1.0, 0.0], abs=1e-9)
+    assert found["size_z"] == pytest.approx([1 / np.sqrt(2), 0.0], abs=1e-9)
+    guess = Contour(found_m, sigma_m, is_closed=True, known=np.array([True, False, False, True]))
+    assert len(size_figures(guess, true_m)["size_z"]) == 1
+    assert size_figures(None, true_m) == NO_SIZES
