@@ -30,11 +30,6 @@ class HandMotion:
         return HandMotion(later.world * self.world, _joined(self, later))
 
     @property
-    def is_carry(self) -> bool:
-        """Whether the object is where it was not before."""
-        return not self.world.equals(Pose3(), 1e-9)
-
-    @property
     def is_rest(self) -> bool:
         """Whether the hand has not moved the object."""
         return self.sigma is None and self.world.equals(Pose3(), 0.0)

@@ -239,7 +239,7 @@ class PolicyChooser:
 
     def spread(self, covariance: Array, carried: HandMotion) -> Array:
         """Covariance of the pose now, from that at the last grasp: a carry that was felt costs less than another."""
-        if not carried.is_carry:
+        if carried.is_rest:
             return covariance
         noise = self._noise.after(planar_motion(carried.world), carried.sigma)
         return covariance + np.diag(noise.sigmas**2)

@@ -49,5 +49,5 @@ class Room:
     def on_carry(self, carried: HandMotion) -> None:
         """The hand carried the object, or left it where it is."""
         self.box = None if self.box is None else self.box.move(planar(carried.world))
-        if carried.is_carry:
+        if not carried.is_rest:
             self.landings_m = []

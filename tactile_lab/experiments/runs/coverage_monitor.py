@@ -274,7 +274,7 @@ class UntilExplored(PolicyDecisions):
         return super().on_capture(grasp, plan)
 
     def on_carry(self, motion: HandMotion) -> None:
-        self._monitor.carried += motion.is_carry
+        self._monitor.carried += not motion.is_rest
         super().on_carry(motion)
 
     def decide(self, index: int) -> Decision:
