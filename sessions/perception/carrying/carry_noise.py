@@ -67,8 +67,8 @@ class CarryNoise:
     links_rad: float = float(np.deg2rad(3.1))
     landed_m_s: float = 0.007
     landed_rad_s: float = float(np.deg2rad(10.0))
-    opened_m: float = 0.0008
-    opened_rad: float = float(np.deg2rad(1.0))
+    opened_m: float = 0.0004
+    opened_rad: float = float(np.deg2rad(0.5))
     stood_m: float = 0.00025
     stood_rad: float = float(np.deg2rad(0.3))
     unseen: float = 0.5
