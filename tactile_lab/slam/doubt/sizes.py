@@ -2,6 +2,9 @@
 
 A jaw of the caliper lies on a place that was touched, or on one that is a guess. Touched at both ends a size is as
 certain as those places. Otherwise only the span of what was touched is known, and the size is the model's opinion.
+
+A place's standard deviation is what is left at the best fit, in which a shift of both ends the same way is taken out:
+the errors that are left at both make a size larger, or both make it smaller, and their standard deviations add up.
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ _JAW_m = 0.0005
 
 @dataclass(frozen=True)
 class Span:
-    """A distance between two ends with its standard deviation, metres, the errors of both being independent."""
+    """A distance between two ends with its standard deviation, metres: the sum of those of both ends."""
 
     length_m: float
     sigma_m: float
@@ -113,4 +116,4 @@ def _jaws(places_m: Array) -> list[NDArray[np.bool_]]:
 
 
 def _span(places_m: Array, sigma_m: Array, ends: list[NDArray[np.bool_]]) -> Span:
-    return Span(float(np.ptp(places_m)), float(np.hypot(*(sigma_m[end].mean() for end in ends))))
+    return Span(float(np.ptp(places_m)), float(sum(sigma_m[end].mean() for end in ends)))

@@ -30,7 +30,7 @@ def test_sizes_are_judged_by_their_own_sigma_where_both_ends_were_touched() -> N
     known = np.array([True, True, True, False])
     found = size_figures(Contour(found_m, sigma_m, is_closed=True, known=known), true_m)
     assert found["size_off_mm"] == pytest.approx([1.0, 0.0], abs=1e-9)
-    assert found["size_z"] == pytest.approx([1 / np.sqrt(2), 0.0], abs=1e-9)
+    assert found["size_z"] == pytest.approx([0.5, 0.0], abs=1e-9)
     guess = Contour(found_m, sigma_m, is_closed=True, known=np.array([True, False, False, True]))
     assert len(size_figures(guess, true_m)["size_z"]) == 1
     assert size_figures(None, true_m) == NO_SIZES
