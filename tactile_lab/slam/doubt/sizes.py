@@ -23,7 +23,7 @@ from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 SIDES = ("length", "width", "height")
 """The longer and the shorter side of the smallest rectangle around the shape seen from above, and its height."""
 
-LARGEST_SIGMA_m = 0.010
+LARGEST_SIGMA_m = 0.014
 """Standard deviation of a size of a complete shape."""
 
 _JAW_m = 0.0005
