@@ -120,15 +120,19 @@ class Positioner:
             self._target = np.minimum(np.maximum(target, self._range[0]), self._range[1])
 
     def _check_range(self, target: Array) -> None:
-        beyond = np.maximum(self._range[0] - target, target - self._range[1])
-        if (beyond > _ROUNDING).any():
-            at = int(np.argmax(beyond))
+        """Raises DeviceError: an axis is sent beyond its range, and farther than it stands beyond it."""
+        beyond = self._beyond(target) - np.maximum(self._beyond(self._sent), _ROUNDING)
+        if (beyond > 0.0).any():
+            at = int(np.argmax(beyond / _ROUNDING))
             low, high = self._range[:, at]
             raise DeviceError(
                 f"{AXES[at]} was sent to {target[at]:.2f}, and goes from {low:.2f} to {high:.2f}",
                 where=self._transport.name,
                 hint="Move the object to the middle of the workspace, or correct the ranges in the rig file",
             )
+
+    def _beyond(self, q: Array) -> Array:
+        return np.asarray(np.maximum(self._range[0] - q, q - self._range[1]))
 
     def stop(self) -> None:
         """Stay here until :meth:`resume`. Never raises."""

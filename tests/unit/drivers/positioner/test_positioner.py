@@ -248,6 +248,17 @@ def test_a_target_beyond_a_range_is_refused_and_the_positioner_stays(
     np.testing.assert_allclose(rig.base.q, start)
 
 
+def test_an_axis_that_stands_beyond_its_range_may_come_back(rig: Rig) -> None:
+    rig.base.q[3] = 13.0
+    rig.device.close()
+    rig.device.connect()
+    target = rig.base.q.copy()
+    target[3] = 12.9
+    rig.device.set_target(target)
+    rig.run(400)
+    assert rig.base.q[3] == pytest.approx(12.5)
+
+
 @pytest.mark.parametrize("bad", [np.zeros(5), np.array([0, 0, np.nan, 0, 0, 0]), np.array([0, 0, np.inf, 0, 0, 0])])
 def test_a_target_that_is_not_six_numbers_is_refused(rig: Rig, bad: Array) -> None:
     with pytest.raises(DeviceError, match="not six finite numbers"):
