@@ -8,12 +8,11 @@ from functools import partial
 
 import numpy as np
 
-from drivers.core.clock import NANOSECONDS
 from drivers.simulation.world import SimulatedWorld
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.slip import slip
 from sessions.rig_runtime.rig_runtime import RigRuntime
-from tactile_lab.benchmarks.components import Timing, TimingTable
+from tactile_lab.benchmarks.components import Timing, TimingTable, median_ms
 from tactile_lab.experiments.runs.carried_objects import CarryWatch, watch_carries
 
 OBJECTS, GRASPS = ("box-10x6x4", "l-block", "cylinder"), 5
@@ -47,9 +46,10 @@ class _TimedCarries(CarryWatch):
         if whole is None or moved is None:
             return
         side, friction = self._runtime.perception.form.side, held.odometry.friction
-        self.whole_ms.append(_ms(lambda: held.odometry.estimate(whole)))
+        self.whole_ms.append(_processor_ms(lambda: held.odometry.estimate(whole)))
         asked = [part for share in _ASKED_AT if (part := _beginning(moved, share)) is not None]
-        self.checks_ms.append(sum(_ms(partial(slip, part, held.fingertips, side, friction)) for part in asked))
+        checks = [partial(slip, part, held.fingertips, side, friction) for part in asked]
+        self.checks_ms.append(sum(map(_processor_ms, checks)))
 
 
 def carry_table(objects: tuple[str, ...] = OBJECTS, grasps: int = GRASPS) -> TimingTable:
@@ -84,11 +84,5 @@ def _beginning(samples: CarrySamples, share: float) -> CarrySamples | None:
     return samples.until(int(first_ns + share * (last_ns - first_ns)))
 
 
-def _ms(work: Callable[[], object]) -> float:
-    """Median processor time of some repetitions, milliseconds."""
-    durations_ns = []
-    for _ in range(_REPEATS):
-        begun_ns = time.process_time_ns()
-        work()
-        durations_ns.append(time.process_time_ns() - begun_ns)
-    return 1e3 * float(np.median(durations_ns)) / NANOSECONDS
+def _processor_ms(work: Callable[[], object]) -> float:
+    return median_ms(work, time.process_time_ns, _REPEATS)

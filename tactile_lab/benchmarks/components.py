@@ -259,13 +259,25 @@ class _Stopwatch:
         self._clock, self._repeats = clock, repeats
 
     def __call__(self, name: str, work: Callable[[], object], note: str) -> Timing:
+        ms = median_ms(work, self._clock.now_ns, self._repeats)
+        return Timing(name, ms, self._repeats, _peak_MB(work), note)
+
+
+def median_ms(work: Callable[[], object], now_ns: Callable[[], int], repeats: int) -> float:
+    """Median duration of repeated runs, milliseconds. One more run before them, which may compile, is not counted.
+
+    Args:
+        work: what is timed.
+        now_ns: the clock, nanoseconds: of elapsed or of processor time.
+        repeats: how often.
+    """
+    work()
+    durations_ns = []
+    for _ in range(repeats):
+        begun_ns = now_ns()
         work()
-        durations_ns = []
-        for _ in range(self._repeats):
-            start_ns = self._clock.now_ns()
-            work()
-            durations_ns.append(self._clock.now_ns() - start_ns)
-        return Timing(name, 1e-6 * float(np.median(durations_ns)), self._repeats, _peak_MB(work), note)
+        durations_ns.append(now_ns() - begun_ns)
+    return 1e-6 * float(np.median(durations_ns))
 
 
 def _peak_MB(work: Callable[[], object]) -> float:

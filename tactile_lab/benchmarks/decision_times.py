@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose2
 
-from drivers.core.clock import Clock, MonotonicClock
-from tactile_lab.benchmarks.components import Timing, TimingTable
+from drivers.core.clock import MonotonicClock
+from tactile_lab.benchmarks.components import Timing, TimingTable, median_ms
 from tactile_lab.experiments.data.planar_hand import planned_rays
 from tactile_lab.experiments.data.solids import solid
 from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays, ring_of_candidates
@@ -31,11 +31,12 @@ def decision_table(contacts: int = CONTACTS, policies: tuple[str, ...] = tuple(P
     """
     belief, candidates = box_belief(contacts), box_candidates()
     what = f"{len(candidates)} candidates, {contacts} contacts, {len(belief.particles)} particles"
-    lines = [
-        Timing(f"{name}: one decision", _median_ms(_decision(name, belief, candidates)), _REPEATS, None, what)
-        for name in policies
-    ]
-    return TimingTable("Choosing the next grasp", tuple(lines))
+
+    def timed(name: str) -> Timing:
+        ms = median_ms(_decision(name, belief, candidates), MonotonicClock().now_ns, _REPEATS)
+        return Timing(f"{name}: one decision", ms, _REPEATS, None, what)
+
+    return TimingTable("Choosing the next grasp", tuple(timed(name) for name in policies))
 
 
 def box_belief(contacts: int) -> Belief:
@@ -81,14 +82,3 @@ def _decision(name: str, belief: Belief, candidates: tuple[Candidate, ...]) -> C
         policy.choose(candidates, replace(belief, displacements_m=moves), rng)
 
     return decide
-
-
-def _median_ms(work: Callable[[], None], clock: Clock | None = None) -> float:
-    clock = clock or MonotonicClock()
-    work()
-    durations = []
-    for _ in range(_REPEATS):
-        started = clock.now_ns()
-        work()
-        durations.append(clock.now_ns() - started)
-    return float(np.median(durations)) / 1e6

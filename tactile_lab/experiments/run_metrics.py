@@ -73,10 +73,14 @@ def slam_figures(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
     """Figures of a whole run."""
     if isinstance(data, PlanarGrasps):
         shape = contour_figures(result.contour, data.outline_m)
+        ends = size_figures(result.contour, data.outline_m)
     elif isinstance(data, SpatialGrasps):
-        shape = mesh_figures(result.mesh, data.mesh, upright=all(map(stands, data.world_T_body)))
+        upright = all(map(stands, data.world_T_body))
+        shape = mesh_figures(result.mesh, data.mesh, upright=upright)
+        ends = size_figures(result.mesh if upright else None, np.asarray(data.mesh.vertices))
     return {
         **shape,
+        **ends,
         **pose_figures(data, result),
         "registration_mm": registration_mm(data, result.world_T_object, result.dimension),
         "status": result.status,
@@ -148,7 +152,7 @@ def size_figures(shape: Contour | SurfaceMesh | None, true_points_m: Array) -> d
     """Errors of the sizes of which both ends were touched: in stated standard deviations, and without sign in mm.
 
     Args:
-        shape: as estimated; None if nothing is known.
+        shape: as estimated; None if nothing is known, or if it does not stand on a table.
         true_points_m: of the true outline, shape (n, 2), or the vertices of the true surface, shape (n, 3), z up.
     """
     if shape is None:

@@ -23,7 +23,7 @@ from tactile_lab.experiments.data.sensing import (
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
-from tactile_lab.experiments.run_metrics import NO_SIZES, size_figures, slam_figures
+from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, SIZES_INSIDE, SURFACE_INSIDE
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.slam.result import SlamResult
@@ -75,7 +75,6 @@ def assessed_run(cell: Cell) -> dict[str, Any]:
     told = result.status != "complete"
     return {
         **figures,
-        **_sizes(data, result),
         "known_share": result.known_share,
         "doubts": [doubt.name for doubt in result.doubts],
         "off": int(off),
@@ -127,14 +126,6 @@ def _far_share(data: SimulatedGrasps, result: SlamResult) -> float:
     else:
         return 1.0
     return float(np.mean(np.abs(errors_m) > _FAR_SIGMAS * sigma_m))
-
-
-def _sizes(data: SimulatedGrasps, result: SlamResult) -> dict[str, Any]:
-    if isinstance(data, PlanarGrasps):
-        return size_figures(result.contour, data.outline_m)
-    if isinstance(data, SpatialGrasps) and all(map(stands, data.world_T_body)):
-        return size_figures(result.mesh, np.asarray(data.mesh.vertices))
-    return NO_SIZES
 
 
 def _where(cell: Cell) -> str:

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tactile_lab.benchmarks.components import THESIS_WEIGHTING_ms, Timing, TimingTable, weighting_case, weighting_table
+from tactile_lab.benchmarks.components import (
+    THESIS_WEIGHTING_ms,
+    Timing,
+    TimingTable,
+    median_ms,
+    weighting_case,
+    weighting_table,
+)
 from tactile_lab.slam.shape.fields.field_grid import FieldGrid
 from tactile_lab.slam.tracking.filter.measurement import CalibratedMeasurement, CalibratedSettings, Known
 
@@ -31,6 +38,16 @@ def test_durations_come_from_the_given_clock_and_only_the_thesis_is_quoted() -> 
     assert all(timing.repeats == 2 and timing.peak_MB is not None for timing in measured)
     assert (quoted.ms, quoted.repeats, quoted.peak_MB) == (THESIS_WEIGHTING_ms, 0, None)
     assert {"ours, from the grid", "scikit-learn", "thesis"} <= {timing.name for timing in table.timings}
+
+
+def test_the_first_run_is_not_counted_and_the_median_of_the_others_is_told() -> None:
+    clock, spent_ms = SteppingClock(), iter([90, 1, 2, 40])
+
+    def work() -> None:
+        for _ in range(next(spent_ms)):
+            clock.now_ns()
+
+    assert median_ms(work, clock.now_ns, 3) == 3.0  # two and one that the look at the clock takes
 
 
 def test_the_grid_weighs_as_the_field_does() -> None:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
+from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.experiments.data.outlines import OUTLINES_m
+from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.data.solids import solid
-from tactile_lab.experiments.run_metrics import NO_SIZES, contour_figures, mesh_figures, size_figures
+from tactile_lab.experiments.run_metrics import NO_SIZES, contour_figures, mesh_figures, size_figures, slam_figures
+from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
 
 
 def test_the_truth_itself_has_no_error_and_is_covered() -> None:
@@ -34,3 +40,26 @@ def test_sizes_are_judged_by_their_own_sigma_where_both_ends_were_touched() -> N
     guess = Contour(found_m, sigma_m, is_closed=True, known=np.array([True, False, False, True]))
     assert len(size_figures(guess, true_m)["size_z"]) == 1
     assert size_figures(None, true_m) == NO_SIZES
+
+
+@pytest.mark.parametrize("motion", ["table", "free"])
+def test_a_run_has_the_sizes_of_what_stands_on_a_table(motion: Literal["table", "free"]) -> None:
+    data = spatial_data.simulate("ellipsoid", 0, motion=motion, count=4)
+    result = _known_poses_run(data, 3, "table" if motion == "table" else "space")
+    whole = size_figures(result.mesh, np.asarray(data.mesh.vertices))
+    assert whole["size_z"]
+    assert slam_figures(data, result)["size_z"] == (whole["size_z"] if motion == "table" else [])
+
+
+def test_a_run_in_the_plane_has_the_sizes_of_its_outline() -> None:
+    data = planar_data.simulate("rectangle", 0, count=4)
+    result = _known_poses_run(data, 2, "table")
+    assert slam_figures(data, result)["size_z"] == size_figures(result.contour, data.outline_m)["size_z"] != []
+
+
+def _known_poses_run(data: SimulatedGrasps, dimension: Literal[2, 3], freedom: Literal["table", "space"]) -> SlamResult:
+    settings = SlamSettings(method="known-pose", dimension=dimension, freedom=freedom)
+    slam = TactileSlam(settings, 0, known_poses=data.world_T_body)
+    for grasp in data.grasps:
+        slam.add_grasp(grasp)
+    return slam.finish()
