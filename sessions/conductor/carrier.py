@@ -12,6 +12,9 @@ from sessions.perception.hand_odometry import HandMotion
 from sessions.recording.recorder import Level
 from sessions.rig_runtime.rig_runtime import RigRuntime
 
+_TRIES = 2
+"""What slipped out of the fingers once may hang better in another grasp; twice, it is the object."""
+
 Tell = Callable[[Level, str], None]
 
 
@@ -27,6 +30,7 @@ class Carrier:
 
     def __init__(self, runtime: RigRuntime, roles: SessionRoles, phase: Callable[[str], None], tell: Tell) -> None:
         self._runtime, self._roles, self._phase, self._tell = runtime, roles, phase, tell
+        self._too_heavy = 0
 
     def carry(self, grasp: Grasp, wanted: Reorientation, *, weighed: bool, last: bool) -> None:
         """Squeeze, and re-orient the object, unless it stays in place or too few fingers hold it.
@@ -74,18 +78,21 @@ class Carrier:
     def _weigh(self, touching: frozenset[str]) -> bool:
         """Weigh the held object, if this session can and nobody objects. Returns whether it is still held.
 
-        Its mass is measured once: a hand's errors are the same every time.
+        Its mass is measured once: a hand's errors are the same every time. What was too heavy twice is lifted no more.
         """
-        roles = self._roles
-        if roles.weigh is None or self._runtime.perception.properties.mass_kg is not None:
+        roles, is_known = self._roles, self._runtime.perception.properties.mass_kg is not None
+        if roles.weigh is None or is_known or self._too_heavy >= _TRIES:
             return True
         if not roles.decisions.may_weigh(roles.performer.plan):
             self._tell(Level.INFO, "the object is not weighed")
             return True
         self._phase("weigh")
-        end = roles.weigh(touching)
-        self._tell(Level.INFO, f"weighed: {end}; {self._runtime.perception.properties.in_words()}")
-        return end.is_held
+        lift = roles.weigh(touching)
+        self._too_heavy += lift.is_too_heavy
+        self._tell(Level.INFO, f"weighed: {lift.in_words()}; {self._runtime.perception.properties.in_words()}")
+        if self._too_heavy == _TRIES:
+            self._tell(Level.WARNING, "the object is too heavy for the fingers: it is lifted no more")
+        return lift.end.is_held
 
     def _told_carry(self) -> HandMotion | None:
         """Report how the object slipped. Returns how it was moved, if the fingertips felt that."""

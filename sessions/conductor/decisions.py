@@ -17,9 +17,9 @@ from drivers.core.errors import TactileLabError
 from sessions.conductor.estimator import Change, EstimatorService, PlannedGrasp, PoseStep, Reorientation, Search
 from sessions.conductor.estimator_client import EstimatorClient
 from sessions.motion.grasp_plan import GraspPlan
+from sessions.motion.lift import Lift
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.safety import InterruptGuard, SafetySupervisor
-from sessions.motion.weighing import LiftEnd
 from sessions.perception.carrying.forecast import Forecast
 from sessions.perception.carrying.slip import Slip
 from sessions.perception.hand_odometry import HandMotion
@@ -179,7 +179,7 @@ class SessionRoles:
     performer: Performer
     decisions: DecisionMaker
     estimator: EstimatorClient
-    weigh: Callable[[frozenset[str]], LiftEnd] | None = None
+    weigh: Callable[[frozenset[str]], Lift] | None = None
     forecast: Callable[[Grasp, float, Array], Forecast | None] | None = None
     survey: Callable[[Callable[[], bool]], BoundingBox | None] | None = None
     find: Callable[[Callable[[], bool], Array, float | None], BoundingBox] | None = None

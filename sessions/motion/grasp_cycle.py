@@ -17,10 +17,11 @@ from sessions.motion.grasp_fingers import GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, TouchPlace, evade
 from sessions.motion.holding import HoldingForces
+from sessions.motion.lift import Lift
 from sessions.motion.motion import Motion
 from sessions.motion.probing.touching import SideTouch, Toucher
 from sessions.motion.travel import travel_height_m
-from sessions.motion.weighing import Grip, LiftEnd, Weigher
+from sessions.motion.weighing import Grip, Weigher
 from sessions.perception.carrying.forecast import Forecast, IntendedCarry
 from sessions.perception.carrying.slip import Slip
 
@@ -269,20 +270,25 @@ class GraspCycle:
         self._plan = replace(self.plan, frame=self._carried_to(share, turn_rad, shift_world_m))
         return motion.runtime.perception.hand.world_T_palm * world_T_before.inverse()
 
-    def weigh(self, touching: frozenset[str]) -> LiftEnd:
+    def weigh(self, touching: frozenset[str]) -> Lift:
         """Drag, lift and set down the object that these fingers hold; the runtime's perception knows what was found."""
         unit_N = max(self.fingers.balanced_forces_N(touching, 1.0).values())
+
+        def hold(force_N: float, only_felt: bool) -> None:
+            forces_N, felt = self.fingers.balanced_forces_N(touching, force_N), self.fingers.pressed(_LEAST_HOLD_N)
+            self.fingers.servo_forces({f: each_N for f, each_N in forces_N.items() if f in felt or not only_felt})
+
         grip = Grip(
-            hold=lambda force_N: self.fingers.servo_forces(self.fingers.balanced_forces_N(touching, force_N)),
+            hold=hold,
             share_pressed=lambda share: share * self.settings.pressed_N / unit_N,
             holding=lambda: frozenset(self.fingers.pressed(_LEAST_HOLD_N)),
             is_pressed=lambda: bool(self.fingers.pressed(self.settings.pressed_N)),
         )
-        end = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
-        if end.is_held:
+        lift = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
+        if lift.end.is_held:
             self.fingers.ease(touching, self.settings.weighing.squeeze_N)
         self._motion.runtime.end_hold()
-        return end
+        return lift
 
     # --- and away ----------------------------------------------------------------------------------------------
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -22,12 +21,11 @@ from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import Closing
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import holds
+from sessions.motion.lift import FIRMER, Lift, LiftEnd
 from sessions.motion.motion import Motion
 from sessions.perception.weighing.weighing import Hanging
 
-_BACK_m, _JERK = 0.003, 2
-_FIRMER = 1.25
-"""Held by a force only so much larger, the object would slip out instead of being lifted."""
+_BACK_m, _JERK, _TRIES = 0.003, 2, 2
 _STANDS_SHARE = 0.5
 """Of the upward force: less, and the object that is set down stands on the table."""
 _PRESSED_SHARE = 0.95
@@ -75,35 +73,19 @@ class WeighingSettings(StrictModel):
     patience: int = Field(default=5, ge=1)
 
 
-class LiftEnd(StrEnum):
-    """How a lift ended, in words."""
-
-    HUNG = "it was lifted and set down again"
-    HELD = "it was lifted, but stood on an edge, or links of the fingers carried a part of it"
-    HEAVY = "it is too heavy: the upward force reached its limit"
-    LOST = "it slipped out of the fingers"
-    PRESSED = "a fingertip was pressed hard"
-    ABOVE = "it was lifted, but a fingertip came down on it when it was set down"
-
-    @property
-    def is_held(self) -> bool:
-        """Whether the fingers still hold the object where they grasped it."""
-        return self not in (LiftEnd.LOST, LiftEnd.ABOVE)
-
-
 @dataclass(frozen=True)
 class Grip:
     """Force control of the fingers that hold the object.
 
     Attributes:
-        hold: one cycle of it, to this force of each finger, N.
+        hold: one cycle of it, to this force of each finger, N, by all of them or only by those that feel the object.
         share_pressed: the force of each finger with which the fingertip that presses most does so with this share of
             the force that counts as pressed hard.
         holding: the fingertips that press the object.
         is_pressed: whether one is pressed hard.
     """
 
-    hold: Callable[[float], None]
+    hold: Callable[[float, bool], None]
     share_pressed: Callable[[float], float]
     holding: Callable[[], frozenset[str]]
     is_pressed: Callable[[], bool]
@@ -121,8 +103,11 @@ class Weigher:
     def __init__(self, motion: Motion, settings: WeighingSettings, grip: Grip) -> None:
         self._motion, self._settings, self._grip = motion, settings, grip
         self._squeeze_N = settings.squeeze_N
+        self._is_up, self._lowers, self._carried_N = False, False, 0.0
+        self._lost: frozenset[str] = frozenset()
+        """Fingertips that no longer feel the object when it begins to be set down."""
 
-    def weigh(self, frame: GraspFrame, table: Closing) -> LiftEnd:
+    def weigh(self, frame: GraspFrame, table: Closing) -> Lift:
         """Drag and lift the object held at a grasp frame, and set it down where it was.
 
         An object that slipped out is not there any more: the hand stays where it lost it.
@@ -139,19 +124,21 @@ class Weigher:
         if end is LiftEnd.HUNG:
             runtime.end_dragging()
             end = self._lift(raised)
-        return end
+        return Lift(end, self._carried_N, self._squeeze_N, self._grip.share_pressed(s.firm_share))
 
     def _lift(self, raised: Callable[..., Array]) -> LiftEnd:
         """Up and down again; once more, firmer and higher, if it did not hang free and the fingers may press more."""
-        s, end = self._settings, LiftEnd.HELD
+        s, end, self._carried_N, held_by = self._settings, LiftEnd.HELD, 0.0, self._grip.holding()
         for height_m in s.lifts_m:
             share, end = self._follow(lambda share: raised(share * height_m), height_m / s.lift_m_s)  # noqa: B023
             if end is LiftEnd.HUNG:
                 end = self._hang(raised, height_m)
+                self._is_up = False
+            self._lost = held_by - self._grip.holding()
             if end is not LiftEnd.LOST and not self._set_down(raised, share * height_m, hung=end is LiftEnd.HUNG):
                 end = LiftEnd.ABOVE
             firm_N = self._grip.share_pressed(s.firm_share)
-            if end is not LiftEnd.HELD or firm_N < _FIRMER * s.squeeze_N:
+            if end is not LiftEnd.HELD or firm_N < FIRMER * s.squeeze_N:
                 break
             self._squeeze_N = firm_N
             self._rest(s.squeeze_s)
@@ -159,9 +146,9 @@ class Weigher:
 
     def _hang(self, raised: Callable[..., Array], height_m: float) -> LiftEnd:
         """To and fro, and what hangs free is squeezed more and less; :attr:`LiftEnd.HELD` if something but the
-        fingertips holds the object.
+        fingertips holds the object. Fingers that carry nothing up there have lost it, whatever they touch.
         """
-        runtime = self._motion.runtime
+        runtime, self._is_up = self._motion.runtime, True
         self._rest(self._settings.rest_s)
         runtime.begin_hanging()
         if (end := self._move_to_and_fro(raised, height_m, self._settings.shift_m)) is not LiftEnd.HUNG:
@@ -189,7 +176,11 @@ class Weigher:
         return end
 
     def _set_down(self, raised: Callable[..., Array], height_m: float, *, hung: bool) -> bool:
-        """Down again; a little back if a fingertip is pressed: one that has slid up comes down on the object.
+        """Down again. Where a fingertip is pressed, the hand goes a little back: an edge has come to stand, and the
+        fingers slide on loosely; or one has slid up and comes down on the object: then it is pressed again.
+
+        A fingertip that has lost the object closes no further meanwhile, and counts as pressed as soon as it feels
+        something: it is above the object.
 
         An object that hung free has crept down in the fingers, and stands before the hand is down: then they slide
         along it. One on an edge is held until the hand is down: its weight is not all in the fingers anyway, and let go
@@ -202,18 +193,35 @@ class Weigher:
         held_N = self._motion.runtime.perception.held_N
         stands_N = _STANDS_SHARE * held_N() if hung else -np.inf
 
-        def lowered(share: float) -> Array:
+        def slide() -> None:
             if held_N() < stands_N:
                 self._squeeze_N = s.landed_N
+
+        self._lowers, left_m = True, height_m
+        for _ in range(_TRIES):
+            if not (left_m := self._lower(raised, left_m, slide)):
+                self._lowers, self._lost, self._squeeze_N = False, frozenset(), s.squeeze_N
+                self._rest(s.rest_s)
+                return True
+            self._squeeze_N = s.landed_N
+            left_m = self._go_back(raised, left_m)
+        return False
+
+    def _go_back(self, raised: Callable[..., Array], height_m: float) -> float:
+        """A little up. Returns the height there."""
+        duration_s = _BACK_m / self._settings.lift_m_s
+        self._motion.follow(lambda share: raised(height_m + share * _BACK_m), duration_s, self._keep)
+        return height_m + _BACK_m
+
+    def _lower(self, raised: Callable[..., Array], height_m: float, each: Callable[[], None]) -> float:
+        """Down from a height, ``each`` cycle, until a fingertip is pressed. Returns how high that was; 0 if never."""
+
+        def lowered(share: float) -> Array:
+            each()
             return raised((1 - share) * height_m)
 
-        share, end = self._follow(lowered, height_m / s.lower_m_s, LiftEnd.PRESSED, _JERK)
-        self._squeeze_N = s.squeeze_N
-        if end is LiftEnd.PRESSED:
-            at_m = (1 - share) * height_m
-            self._motion.follow(lambda share: raised(at_m + share * _BACK_m), _BACK_m / s.lift_m_s, self._keep)
-        self._rest(s.rest_s)
-        return end is LiftEnd.HUNG
+        share, end = self._follow(lowered, height_m / self._settings.lower_m_s, LiftEnd.PRESSED, _JERK)
+        return (1 - share) * height_m if end is LiftEnd.PRESSED else 0.0
 
     def _move_to_and_fro(self, raised: Callable[..., Array], height_m: float, far_m: float) -> LiftEnd:
         """To one side, to the other and back, across the direction in which the thumb holds against the fingers: along
@@ -253,14 +261,16 @@ class Weigher:
         return share, ended
 
     def _objection(self) -> LiftEnd | None:
-        if self._grip.is_pressed():
+        if self._grip.is_pressed() or (self._lowers and self._lost & self._grip.holding()):
             return LiftEnd.PRESSED
-        if not holds(self._grip.holding()):
+        held_N = self._motion.runtime.perception.held_N()
+        self._carried_N = max(self._carried_N, held_N)
+        if not holds(self._grip.holding()) or (self._is_up and held_N < 0.0):
             return LiftEnd.LOST
-        return LiftEnd.HEAVY if self._motion.runtime.perception.held_N() > self._settings.most_N else None
+        return LiftEnd.HEAVY if held_N > self._settings.most_N else None
 
     def _keep(self) -> bool:
-        self._grip.hold(self._squeeze_N)
+        self._grip.hold(self._squeeze_N, self._lowers)
         return True
 
     def _rest(self, duration_s: float) -> None:

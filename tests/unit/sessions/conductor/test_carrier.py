@@ -11,7 +11,7 @@ from gtsam import Pose3, Rot3
 from drivers.core.contacts import StepSigma
 from sessions.conductor.carrier import Carrier
 from sessions.conductor.estimator import Reorientation
-from sessions.motion.weighing import LiftEnd
+from sessions.motion.lift import Lift, LiftEnd
 from sessions.perception.carrying.forecast import Forecast
 from sessions.perception.carrying.slip import Slip
 from sessions.perception.carrying.vibration import HeardSlip
@@ -40,6 +40,7 @@ class Bench:
         slipped=None,
         heard=None,
         mass_kg=None,
+        allowed_N=2.0,
     ):
         self.done, self.told, self.logged, self.motions = [], [], [], []
         cycle = SimpleNamespace(
@@ -54,7 +55,7 @@ class Bench:
             supervisor=SimpleNamespace(count_contacts=lambda count: None),
             performer=cycle,
             decisions=decisions,
-            weigh=(lambda touching: self.done.append("weigh") or end) if can_weigh else None,
+            weigh=(lambda touching: self.done.append("weigh") or Lift(end, 2.6, 0.8, allowed_N)) if can_weigh else None,
             forecast=lambda grasp, turn, shift: self.done.append("forecast") or forecast,
         )
         properties = SimpleNamespace(in_words=lambda: "mass 300 g", mass_kg=mass_kg)
@@ -155,3 +156,20 @@ def test_a_weighing_says_how_it_ended_and_what_it_found():
     ((level, words),) = Bench().carry(weighed=True).told
     assert level is Level.INFO
     assert words == f"weighed: {LiftEnd.HUNG}; mass 300 g"
+
+
+def test_what_was_too_heavy_twice_is_lifted_no_more_and_carried_all_the_same():
+    bench = Bench(end=LiftEnd.LOST, allowed_N=0.9)
+    for _ in range(3):
+        bench.carry(weighed=True)
+    assert bench.done.count("weigh") == 2 * 2  # told as a phase, and done
+    assert bench.done[-1] == "re-orient"
+    assert [level for level, _ in bench.told] == [Level.INFO, Level.INFO, Level.WARNING]
+    assert "at least 1.00 N needed, at most 0.90 N allowed" in bench.told[0][1]
+
+
+def test_what_slips_but_may_be_held_more_firmly_is_lifted_again():
+    bench = Bench(end=LiftEnd.LOST, allowed_N=2.0)
+    for _ in range(3):
+        bench.carry(weighed=True)
+    assert bench.done.count("weigh") == 3 * 2

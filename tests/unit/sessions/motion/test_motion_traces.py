@@ -60,7 +60,7 @@ def test_a_whole_grasp(name: str) -> None:
         cycle.squeeze(grasp.touching)
         told["carried"] = cycle.reorient(0.3, np.array([0.01, -0.005]), grasp.touching).matrix()[:3]
         if plan.closing == "pinch":
-            told["weighed"] = str(cycle.weigh(grasp.touching))
+            told["weighed"] = str(cycle.weigh(grasp.touching).end)
         world.part("release")
         cycle.release()
         world.part("lift")
