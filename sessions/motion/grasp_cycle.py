@@ -184,8 +184,8 @@ class GraspCycle:
     # --- close and measure -------------------------------------------------------------------------------------
 
     def close(self) -> None:
-        """Close every finger until it touches; see :meth:`GraspFingers.close`."""
-        self.fingers.close()
+        """Close the fingers that shall until they touch; see :meth:`GraspFingers.close`."""
+        self.fingers.close(self.plan.stays_open)
 
     def settle(self) -> None:
         """Bring the fingers that touch to the contact force, then let hand and object come to rest."""

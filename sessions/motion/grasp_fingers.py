@@ -51,15 +51,15 @@ class GraspFingers:
         """Take the open hand as the present progress."""
         self.progress = _open(self.table)
 
-    def close(self) -> None:
-        """Close every finger along its path until it touches, meets the thumb, or reaches the end of the path.
+    def close(self, stays_open: frozenset[str] = frozenset()) -> None:
+        """Close every finger but these along its path until it touches, meets the thumb, or reaches the path's end.
 
         Links above the fingertips have no sensors. A finger that one of them holds up stops, and all stop if the object
         is pushed hard against a fingertip.
         """
         s, table = self.settings, self.table
         step_m = s.closing_m_s * self._motion.supervisor.speed_scale * self._motion.cycle_s
-        moving, touched = set(self._fingers), dict.fromkeys(self._fingers, 0)
+        moving, touched = set(self._fingers) - stays_open, dict.fromkeys(self._fingers, 0)
         self._motion.runtime.begin_closing()
         while moving and not self.pressed(s.closing_most_N):
             loads_N = self._motion.loads_N()

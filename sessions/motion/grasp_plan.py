@@ -47,6 +47,7 @@ class GraspPlan:
         may_shift: where a fingertip lands the hand may try again a little aside.
         may_rise: where only a link lands it may try again higher.
         is_gentle: fingertips press less than usual: what they hold leans easily.
+        stays_open: fingers that do not close.
     """
 
     frame: GraspFrame
@@ -59,6 +60,7 @@ class GraspPlan:
     may_shift: bool = True
     may_rise: bool = True
     is_gentle: bool = False
+    stays_open: frozenset[str] = frozenset()
 
     def raised(self, by_m: float, highest_m: float) -> GraspPlan | None:
         """The same grasp so much higher, in whole millimetres; None above ``highest_m``, or where it may not be."""

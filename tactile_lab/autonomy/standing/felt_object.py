@@ -15,6 +15,7 @@ from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
 from tactile_lab.autonomy.standing.roundness import is_round
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
+from tactile_lab.autonomy.standing.storeys import Storeys, storeys_of
 
 _LEAST_FOR_BOX = 4
 """Contacts that tell a box, and whether it is one."""
@@ -95,9 +96,9 @@ class FeltObject:
         self._points_m, self._normals = [*self._points_m, *points_m], [*self._normals, *normals]
         if not self._points_m:
             return
-        points_m, normals = np.array(self._points_m), np.array(self._normals)
+        points_m, normals = self._contacts()
         top_m = max(self.box.top_m or 0.0, float(points_m[:, 2].max()))
-        beside = np.logical_and(on_sides(normals), self._faces_outward(points_m, normals))
+        beside = self._is_outside(points_m, normals)
         if np.count_nonzero(beside) >= _LEAST_FOR_BOX:
             self.box = self._fitted(points_m[beside], normals[beside])
         places = np.array([self.box.world_T_box.transformTo(point) for point in points_m[:, :2]])
@@ -112,10 +113,10 @@ class FeltObject:
         )
         self.box = self._first = self._moved = replace(self.box, low_m=low_m, high_m=high_m)
 
-    def _faces_outward(self, points_m: Array, normals: Array) -> NDArray[np.bool_]:
-        """Which contacts are not on the inside of something hollow, shape (n,)."""
+    def _is_outside(self, points_m: Array, normals: Array) -> NDArray[np.bool_]:
+        """Which contacts are on sides, and not on the inside of something hollow, shape (n,)."""
         outward = points_m[:, :2] - self._moved.centre_world_m
-        return np.asarray(np.einsum("nk,nk->n", outward, normals[:, :2]) > 0)
+        return np.asarray(on_sides(normals) & (np.einsum("nk,nk->n", outward, normals[:, :2]) > 0))
 
     def _fitted(self, points_m: Array, normals: Array) -> BoundingBox:
         """The box around contacts on sides; where none faces outward it reaches as far as the first box did."""
@@ -165,9 +166,19 @@ class FeltObject:
         return StandingBox(x, y, self.box.world_T_box.theta(), (length_m, width_m, self.box.top_m or 0.0))
 
     @property
+    def storeys(self) -> Storeys:
+        """The box, narrower at heights where contacts say so."""
+        points_m, normals = self._contacts()
+        return storeys_of(self.box, points_m, normals, self._is_outside(points_m, normals))
+
+    def _contacts(self) -> tuple[Array, Array]:
+        """Places and normals of all contacts, shape (n, 3) each, world frame."""
+        return np.array(self._points_m).reshape(-1, 3), np.array(self._normals).reshape(-1, 3)
+
+    @property
     def is_round(self) -> bool:
         """Whether contacts say that the box is no box; see :func:`is_round`."""
-        points_m, normals = (np.array(some).reshape(-1, 3) for some in (self._points_m, self._normals))
+        points_m, normals = self._contacts()
         beside, yaw_rad = on_sides(normals), self.box.world_T_box.theta()
         if np.count_nonzero(beside) < _LEAST_FOR_BOX:
             return False
@@ -227,7 +238,7 @@ class FeltObject:
     @property
     def top_place_m(self) -> Array:
         """Where its top was met, world x, y; the middle of the box where it was not."""
-        points_m, normals = np.array(self._points_m).reshape(-1, 3), np.array(self._normals).reshape(-1, 3)
+        points_m, normals = self._contacts()
         on_top = (normals[:, 2] > _UPWARD) & (points_m[:, 2] > (self.box.top_m or 0.0) - _NEAR_m)
         return np.asarray(points_m[on_top, :2].mean(axis=0)) if on_top.any() else self.middle_m
 

@@ -76,7 +76,8 @@ class StandingPlanner:
     def __post_init__(self) -> None:
         self.whereabouts = Whereabouts(self.felt, self.searches)
         where = (self.felt, self.hand, self.yaw_window_rad, self.reach)
-        self._grasping, self._pinching = SidePlanner(*where), RimPlanner(*where)
+        lowest_m = (self.settings or TouchSettings()).side_heights_m
+        self._grasping, self._pinching = SidePlanner(*where, lowest_m), RimPlanner(*where)
         self._touching = None if self.settings is None else TouchPlanner(*where, self.settings)
 
     def plan(self) -> GraspPlan | None:

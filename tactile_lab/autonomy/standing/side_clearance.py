@@ -6,7 +6,9 @@ its approach clear of box and table; then each finger closes, and its tip has to
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -24,6 +26,13 @@ _CLEAR_m, _CLEAR_CLOSING_m = 0.004, 0.002
 _LEAST_FINGERS = 3
 
 
+class Solid(Protocol):
+    """Something on the table, as far as it is known."""
+
+    def distances_m(self, places_m: Array) -> Array:
+        """Of world places (..., 3) to its surface, negative inside, shape (...)."""
+
+
 @dataclass(frozen=True)
 class StandingBox:
     """An upright box on the table.
@@ -37,6 +46,15 @@ class StandingBox:
     y_m: float
     yaw_rad: float
     size_m: tuple[float, float, float]
+
+    @property
+    def centre_m(self) -> Array:
+        """Of its foot, world x, y."""
+        return np.array([self.x_m, self.y_m])
+
+    def front_m(self, way: Array) -> float:
+        """Where it begins along the way one comes, a horizontal unit vector, shape (2,), from the world's origin."""
+        return float(self.centre_m @ way) - self.half_along_m(way)
 
     def grow(self, side_m: float, top_m: float) -> StandingBox:
         """With every side farther out, and the top higher; less where that is negative."""
@@ -73,42 +91,60 @@ class StandingBox:
         return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0))
 
 
-def is_way_clear(plan: GraspPlan, hand: HandShape, box: StandingBox) -> bool:
-    """Whether the open hand comes along its approach with nothing of it in the box or the table."""
+@dataclass(frozen=True)
+class ExpectedClosing:
+    """What comes of closing the hand beside a standing object.
+
+    Attributes:
+        touches: where fingertips would meet it, world, shape (3,), by finger.
+        stays_open: the fingers that must not close: a link of theirs would meet something before the fingertip does.
+    """
+
+    touches: Mapping[str, Array]
+    stays_open: frozenset[str] = field(default_factory=frozenset)
+
+    @property
+    def holds(self) -> bool:
+        """Whether the thumb is against fingers enough."""
+        return "TH" in self.touches and len(self.touches) >= _LEAST_FINGERS
+
+
+def is_way_clear(plan: GraspPlan, hand: HandShape, solid: Solid) -> bool:
+    """Whether the open hand comes along its approach with nothing of it in the object or the table."""
     opened, table = open_hand(plan.closing, plan.height_m, hand), closing(plan.closing, plan.height_m, hand)
     if opened.lowest_m < _CLEAR_m:
         return False
     offsets_m = -np.array(_APPROACH_m)[:, None, None] * np.array(table.approach)
-    return bool((box.distances_m(_to_world(plan, opened.centres_m + offsets_m)) - opened.radii_m).min() >= _CLEAR_m)
+    return bool((solid.distances_m(_to_world(plan, opened.centres_m + offsets_m)) - opened.radii_m).min() >= _CLEAR_m)
 
 
-def expected_touches(plan: GraspPlan, hand: HandShape, box: StandingBox, surely: StandingBox) -> dict[str, Array]:
-    """Where fingertips would meet the box, world, shape (3,), by finger; none where a link would meet it first.
+def expected_closing(plan: GraspPlan, hand: HandShape, solid: Solid, surely: Solid) -> ExpectedClosing:
+    """Which fingertips would meet an object, and which fingers have to stay open.
 
     Args:
         plan: of the grasp.
         hand: its form, and the shape of its fingertips.
-        box: nothing but fingertips may meet it.
-        surely: a fingertip counts only if it meets this smaller box too.
+        solid: the object; nothing but fingertips may meet it.
+        surely: a fingertip counts only if it meets this smaller solid too.
     """
     table, links = closing(plan.closing, plan.height_m, hand), link_balls(plan.closing, plan.height_m, hand)
     tips_m = np.array([[table.path(finger).centre_m(u) for finger in table.fingers] for u in PROGRESS])
     tips_world_m = _to_world(plan, tips_m)
-    meets = (box.distances_m(tips_world_m) < hand.radius_m) & links.usable
+    meets = (solid.distances_m(tips_world_m) < hand.radius_m) & links.usable
     surely_meets = (surely.distances_m(tips_world_m) < hand.radius_m) & links.usable
     link_places_m = _to_world(plan, links.centres_m)
-    in_something = box.distances_m(link_places_m) < links.radii_m + _CLEAR_CLOSING_m
+    in_something = solid.distances_m(link_places_m) < links.radii_m + _CLEAR_CLOSING_m
     in_something |= link_places_m[..., 2] < links.radii_m + _CLEAR_CLOSING_m
-    found = {}
+    touches, stays_open = {}, set()
     for index, finger in enumerate(table.fingers):
         stops = int(np.argmax(meets[:, index])) if meets[:, index].any() else len(PROGRESS) - 1
         passed = links.usable[: stops + 1, index]
         if in_something[: stops + 1][:, links.fingers == index][passed].any():
-            return {}
-        if surely_meets[:, index].any():
+            stays_open.add(finger)
+        elif surely_meets[:, index].any():
             way = plan.frame.pose.rotation().rotate(table.path(finger).direction)
-            found[finger] = tips_world_m[stops, index] + hand.radius_m * np.asarray(way)
-    return found if "TH" in found and len(found) >= _LEAST_FINGERS else {}
+            touches[finger] = tips_world_m[stops, index] + hand.radius_m * np.asarray(way)
+    return ExpectedClosing(touches, frozenset(stays_open))
 
 
 def _to_world(plan: GraspPlan, places_m: Array) -> Array:

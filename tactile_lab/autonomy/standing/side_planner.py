@@ -15,17 +15,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from drivers.core.contacts import Array
-from drivers.shadow.closing.closing import SIDES, LOWEST_m, closing, sideways
+from drivers.shadow.closing.closing import SIDES, closing, sideways
+from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, TouchPlace
+from sessions.motion.probing.touch_patterns import lowest_touch_m
 from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate, approach_of
-from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear
+from tactile_lab.autonomy.standing.side_clearance import expected_closing, is_way_clear
+from tactile_lab.autonomy.standing.storeys import Storeys
 
 _MARGIN_m = 0.003
 """Of the box that the hand keeps out of, beyond what was touched."""
 
-_SURELY_m, _BELOW_TOP_m = 0.008, 0.012
-"""A fingertip counts that meets a box so much smaller on its sides and at its top."""
+_SURELY_m, _BELOW_TOP_m = 0.012, 0.012
+"""A fingertip counts that meets a box so much smaller on its sides and at its top, with its centre inside the edges. On
+an edge itself a contact's normal belongs to neither face."""
 
 _HEIGHT_STEP_m, _DEPTH_STEP_m, _DEEPEST_m, _SHALLOWEST_m = 0.02, 0.005, 0.05, 0.005
 _SHALLOWER_m = 0.010
@@ -36,6 +40,9 @@ _LOW_FIRST = 0.1
 
 _FRICTION = 0.5
 """Of the table and the foot, at most: a push higher than half the width by this tips an object before it slides."""
+
+_ASKEW_rad = np.radians(15.0)
+"""A side that the arm cannot turn to squarely is held so much from aside: fingertips do not slip yet."""
 
 _ROW_m = 0.07
 """Height of the row of fingertips in a touch from the side."""
@@ -48,7 +55,13 @@ def slides_up_to_m(foot_m: float) -> float:
 
 @dataclass
 class SidePlanner(ActionPlanner):
-    """Plans grasps from the side around one object."""
+    """Plans grasps from the side around one object.
+
+    Attributes:
+        lowest_m: height of the lowest fingertip with the first finger down, and up.
+    """
+
+    lowest_m: tuple[float, float] = TouchSettings().side_heights_m
 
     def best(self) -> StandingCandidate | None:
         """The next grasp; None where nothing is left that would tell anything new."""
@@ -63,35 +76,42 @@ class SidePlanner(ActionPlanner):
 
     def _candidates(self) -> Iterator[StandingCandidate]:
         """The deepest clear grasp across each side of the box, from both sides of the arm, at each height."""
-        felt = self.felt.standing_box
-        box, surely = felt.grow(_MARGIN_m, 0.0), felt.grow(-_SURELY_m, -_BELOW_TOP_m)
-        for yaw_rad in self.felt.yaws(self.yaw_window_rad):
+        felt, top_m = self.felt.storeys, self.felt.standing_box.size_m[2]
+        solid, surely = felt.grow(_MARGIN_m, 0.0), felt.grow(-_SURELY_m, -_BELOW_TOP_m)
+        for yaw_rad in self.felt.yaws(self.yaw_window_rad, _ASKEW_rad):
             for side in SIDES:
-                for height_m in np.arange(LOWEST_m, max(felt.size_m[2] - _BELOW_TOP_m, LOWEST_m), _HEIGHT_STEP_m):
-                    name = sideways("pinch", side)
-                    if found := self._deepest(name, yaw_rad, float(height_m), box, surely):
+                name, lowest_m = sideways("pinch", side), lowest_touch_m(side, self.lowest_m, self.hand)
+                for height_m in np.arange(lowest_m, max(top_m - _BELOW_TOP_m, lowest_m), _HEIGHT_STEP_m):
+                    if found := self._deepest(name, yaw_rad, float(height_m), solid, surely):
                         yield found
 
     def _deepest(
-        self, name: str, yaw_rad: float, height_m: float, box: StandingBox, surely: StandingBox
+        self, name: str, yaw_rad: float, height_m: float, solid: Storeys, surely: Storeys
     ) -> StandingCandidate | None:
         approach = np.array(closing(name, height_m, self.hand).approach[:2])
         c, s = np.cos(yaw_rad), np.sin(yaw_rad)
         way = np.array([[c, -s], [s, c]]) @ approach
-        half_m, is_gentle = box.half_along_m(way), self.felt.is_unsteady(np.array([c, s]))
+        is_gentle = self.felt.is_unsteady(np.array([c, s]))
         if self.felt.is_unsteady(way) and not is_gentle:
             return None
-        for depth_m in np.arange(_DEEPEST_m, _SHALLOWEST_m - 1e-9, -_DEPTH_STEP_m):
-            x, y = np.array([box.x_m, box.y_m]) - (half_m - depth_m) * way
+        foot, held = solid.boxes[0], solid.at(height_m + _ROW_m / 2)
+        deepest_m = _DEEPEST_m + held.front_m(way) - foot.front_m(way)
+        for depth_m in np.arange(deepest_m, _SHALLOWEST_m - 1e-9, -_DEPTH_STEP_m):
+            x, y = held.centre_m + (foot.front_m(way) + depth_m - held.centre_m @ way) * way
             plan = GraspPlan(GraspFrame(float(x), float(y), yaw_rad), name, height_m, is_gentle=is_gentle)
             if self._was_blocked(plan, float(depth_m)) or not self.reach.holds(plan, self.hand):
                 continue
-            if not is_way_clear(plan, self.hand, box):
-                continue
-            if touches := expected_touches(plan, self.hand, box, surely):
-                score_m = self.felt.novelty_m(np.array(list(touches.values()))) - _LOW_FIRST * height_m
-                return StandingCandidate(plan, touches, score_m, float(depth_m))
+            if is_way_clear(plan, self.hand, solid) and (one := self._closing(plan, float(depth_m), solid, surely)):
+                return one
         return None
+
+    def _closing(self, plan: GraspPlan, depth_m: float, solid: Storeys, surely: Storeys) -> StandingCandidate | None:
+        """The grasp with the fingers that would meet the object; None where they do not hold it."""
+        expected = expected_closing(plan, self.hand, solid, surely)
+        if not expected.holds:
+            return None
+        score_m = self.felt.novelty_m(np.array(list(expected.touches.values()))) - _LOW_FIRST * plan.height_m
+        return StandingCandidate(replace(plan, stays_open=expected.stays_open), expected.touches, score_m, depth_m)
 
     def _was_blocked(self, plan: GraspPlan, depth_m: float) -> bool:
         """Whether the hand met something on nearly the same way, less than a little deeper."""
@@ -107,7 +127,8 @@ class SidePlanner(ActionPlanner):
         """A touch of the side that the hand comes from; None where it tells nothing new, or tips the object over."""
         box, way = self.felt.standing_box, approach_of(plan, self.hand)
         heights_m = np.arange(plan.height_m, min(plan.height_m + _ROW_m, box.size_m[2]), _ROW_m / 3)
-        front = np.array([box.x_m, box.y_m]) - box.half_along_m(way) * way
+        met = self.felt.storeys.at(plan.height_m)
+        front = met.centre_m + (met.front_m(way) - met.centre_m @ way) * way
         places_m = np.array([[*front, height_m] for height_m in heights_m])
         steady_m = slides_up_to_m(box.foot_along_m(way))
         if heights_m.mean() >= steady_m or not self.felt.is_unknown(places_m):

@@ -83,7 +83,7 @@ class TouchPlanner(ActionPlanner):
 
     def _taps(self) -> Iterator[StandingCandidate]:
         """Side by side over the top."""
-        box, yaw = self.felt.standing_box, float(np.mean(self.yaw_window_rad))
+        box, yaw = self.felt.storeys.boxes[-1], float(np.mean(self.yaw_window_rad))
         for along_m in _places(box.size_m[0] / 2, _TAPS_APART_m):
             for across_m in _places(box.size_m[1] / 2, _TAPS_APART_m):
                 x, y = _at(box, along_m, across_m)
@@ -113,23 +113,30 @@ class TouchPlanner(ActionPlanner):
                 yield from self._going_on([one for one in places if self._is_open(one)])
 
     def _on_side(self, yaw_rad: float, name: str, lowest_m: float) -> Iterator[StandingCandidate]:
-        box, across = self.felt.standing_box, np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+        box, storeys = self.felt.standing_box, self.felt.storeys
+        across = np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.hand)
         if not self.felt.may_be_pushed(way):
             return
-        foot_m, wide_m = box.foot_along_m(way), box.half_along_m(across)
+        foot_m = box.foot_along_m(way)
         up_to_m = min(slides_up_to_m(foot_m), box.size_m[2] - _INSIDE_m)
         low_m, laid_m = (lowest_m + 1e-9, 0.0) if self.felt.is_slender(way) else (np.inf, up_to_m)
-        for lane_m in _places(_SQUARELY * wide_m if self.felt.is_round else wide_m, _LANES_APART_m):
-            lane = np.array([box.x_m, box.y_m]) + lane_m * across
-            if box.distances_m(np.array([*lane, box.size_m[2] / 2])) > -_INSIDE_m:
-                continue
-            front = lane - box.way_out_m(lane, -way) * way
-            is_beyond = box.foot_along_m(across) - abs(lane_m) > _CLOSINGS_REACH_m
-            for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m):
-                if height_m < min(up_to_m, low_m) or (is_beyond and self._hardly_leans(float(height_m), foot_m)):
-                    place = TouchPlace(GraspFrame(float(front[0]), float(front[1]), yaw_rad), float(height_m), laid_m)
+        for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m).tolist():
+            slides, met = height_m < min(up_to_m, low_m), storeys.at(height_m)
+            for lane_m in self._lanes_m(met, across):
+                is_beyond = met.foot_along_m(across) - abs(lane_m) > _CLOSINGS_REACH_m
+                if slides or (is_beyond and self._hardly_leans(height_m, foot_m)):
+                    lane = met.centre_m + lane_m * across
+                    front = lane - met.way_out_m(lane, -way) * way
+                    place = TouchPlace(GraspFrame(float(front[0]), float(front[1]), yaw_rad), height_m, laid_m)
                     yield self._at(place, name)
+
+    def _lanes_m(self, box: StandingBox, across: Array) -> list[float]:
+        """How far aside from a box's middle, along a horizontal unit vector, shape (2,), a finger comes to its side."""
+        wide_m = box.half_along_m(across) * (_SQUARELY if self.felt.is_round else 1.0)
+        lanes_m = _places(wide_m, _LANES_APART_m)
+        places_m = np.column_stack([box.centre_m + lanes_m[:, None] * across, np.full(len(lanes_m), box.size_m[2] / 2)])
+        return [float(lane) for lane in lanes_m[box.distances_m(places_m) <= -_INSIDE_m]]
 
     def _at(self, place: TouchPlace, name: str) -> StandingCandidate:
         """A touch at a place on a side by a closing of that name."""

@@ -96,6 +96,15 @@ def test_a_finger_that_is_held_up_closes_no_farther_and_the_others_do(strain: St
     assert "MF" not in strain.cycle.fingers.touching
 
 
+def test_fingers_that_stay_open_do_not_close_and_the_others_do(strain: Strain) -> None:
+    assert strain.cycle.descend(replace(PLAN, stays_open=frozenset({"LF", "MF"})))
+    opened = ways(strain.cycle)
+    strain.cycle.close()
+    closed = ways(strain.cycle)
+    assert {finger for finger in FINGERS if closed[finger] == opened[finger]} == {"LF", "MF"}
+    assert strain.cycle.fingers.touching == frozenset(FINGERS) - {"LF", "MF"}
+
+
 def test_all_fingers_stop_closing_where_one_is_pressed_hard(strain: Strain) -> None:
     assert strain.cycle.descend(PLAN)
     opened = ways(strain.cycle)

@@ -21,7 +21,7 @@ from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.standing.candidate import SideReach, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner
-from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_touches, is_way_clear
+from tactile_lab.autonomy.standing.side_clearance import StandingBox, expected_closing, is_way_clear
 from tactile_lab.autonomy.variance_planner import ExplorationSettings
 
 TIP = HandShape()
@@ -73,8 +73,9 @@ def test_a_plan_is_clear_on_its_way_and_thumb_and_fingers_meet_the_box() -> None
     assert plan is not None
     assert closing(plan.closing, plan.height_m, TIP).is_sideways
     assert is_way_clear(plan, TIP, standing(felt))
-    touches = expected_touches(plan, TIP, standing(felt), standing(felt))
-    assert "TH" in touches
+    expected = expected_closing(plan, TIP, standing(felt), standing(felt))
+    assert expected.holds
+    touches = expected.touches
     assert len(touches) >= 4
     assert np.abs(standing(felt).distances_m(np.array(list(touches.values())))).max() < 0.006
 
@@ -95,7 +96,7 @@ def test_next_grasp_is_where_nothing_was_touched_until_nothing_is_left() -> None
         plan = beside.plan()
         if plan is None:
             break
-        touches = expected_touches(plan, TIP, standing(beside.felt.box), standing(beside.felt.box))
+        touches = expected_closing(plan, TIP, standing(beside.felt.box), standing(beside.felt.box)).touches
         heights += [place[2] for place in touches.values()]
         beside.on_grasp(grasp(np.array(list(touches.values())), list(touches)))
     assert plan is None
@@ -119,6 +120,36 @@ def test_what_is_unsteady_is_held_gently_and_never_by_a_hand_that_comes_to_its_b
     thin = Pose2(0.0, 0.0, -0.37).rotation().matrix()[:, 0]
     assert max(abs(thin @ approach_of(plan, TIP)) for plan in slender) < 0.1
     assert {plan.is_gentle for plan in all_grasps(box(0.050, 0.050, 0.190))} == {True}, "unsteady all around"
+
+
+def test_a_finger_whose_link_would_land_stays_open_and_the_others_hold() -> None:
+    """What is 80 mm wide is hardly entered: the little finger's links would meet its edge before the fingertip."""
+    upright = StandingBox(0.0, 0.0, 0.0, (0.08, 0.10, 0.11))
+    found = planner(BoundingBox(Pose2(), np.array([-0.04, -0.05]), np.array([0.04, 0.05]), 0.0, 0.11, {}))
+    plans = [one.plan for one in found._grasping._candidates()]
+    assert any(plan.stays_open for plan in plans)
+    for plan in plans:
+        expected = expected_closing(plan, TIP, upright, upright)
+        assert expected.stays_open <= plan.stays_open, "the planner's box is a little larger"
+        assert len(expected.touches.keys() - plan.stays_open) >= 3
+        assert "TH" not in plan.stays_open
+
+
+def test_what_becomes_narrower_upward_is_entered_deeper_than_its_foot_allows() -> None:
+    """The same foot as above, with contacts on all sides higher up that say it is 50 mm wide there."""
+    foot, body = np.array([0.04, 0.05]), np.array([0.025, 0.03])
+    felt = FeltObject(BoundingBox(Pose2(), -foot, foot, 0.0, 0.16, {}))
+    before = max(
+        len(one.touches) for one in StandingPlanner(felt, TIP, WINDOW_rad, SideReach())._grasping._candidates()
+    )
+    ways = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    low, high = (ways * [*half, 0.0] + [0.0, 0.0, height] for half, height in ((foot, 0.02), (body, 0.06)))
+    felt.add(np.vstack([low, high]), np.vstack([ways, ways]))
+    after = list(StandingPlanner(felt, TIP, WINDOW_rad, SideReach())._grasping._candidates())
+    assert max(len(one.touches) for one in after) > before
+    deep = max(after, key=lambda one: one.depth_m)
+    assert deep.depth_m > 0.05 - 0.03
+    assert is_way_clear(deep.plan, TIP, felt.storeys)
 
 
 def meet_one(beside: StandingPlanner, *, is_placed: bool) -> bool:

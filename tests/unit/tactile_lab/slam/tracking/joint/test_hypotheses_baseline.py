@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.core.contacts import Array
+from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
@@ -238,6 +238,20 @@ def test_grasps_are_placed_later(kind: Kind) -> None:
         "two in a row": told(associate_deferred(judge.score(spoilt(two, 3, [0, 1, 2])), NOISE, SETTINGS, None, judge)),
     }
     assert_baseline(f"tracking/joint/deferred-{kind}", values, **CLOSE)
+
+
+def test_what_was_felt_to_stand_still_is_not_found_elsewhere_for_the_price_of_a_lost_object() -> None:
+    """Not felt, the object was lost at one price, wherever it is found; felt, that costs as much as it is far."""
+    known, judge = true_placed(unheld(session("plane"), 4), "plane"), scorer()
+    aside = known.placed[4].put_aside()
+    stood = replace(aside, motion_sigma=StepSigma(translation_m=0.00025, rotation_rad=0.005))
+    lost, felt_still = (
+        relocate_last(judge.score(known.with_placed(4, one)), anywhere, judge) for one in (aside, stood)
+    )
+    assert any(one.map.placed[4].moved is Moved.FREELY for one in lost)
+    assert felt_still
+    assert all(one.map.placed[4].moved is Moved.AS_MEANT for one in felt_still)
+    assert min(one.cost for one in felt_still) > min(one.cost for one in lost)
 
 
 @pytest.mark.parametrize("kind", KINDS)
