@@ -23,6 +23,7 @@ from tactile_lab.slam.doubt.status import (
     status_of,
 )
 from tactile_lab.slam.doubt.symmetry import NEARLY_ALIKE_m, Symmetry, symmetry_of
+from tactile_lab.slam.doubt.unfelt_top import doubts_of_top
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
@@ -83,7 +84,8 @@ def assess(
         floor_m = -origin_height_m if stands else None
         reach_m = REACH_m if sum(grasp.used for grasp in contact_map.placed) >= LEAST_GRASPS else REACH_ALONE_m
         part = known_part(shape, contact_map.contacts, floor_m, contact_map.free_points_m, reach_m=reach_m)
-        missing = missing_parts(contact_map, shape, floor_m) if isinstance(shape, SurfaceMesh) else []
+        if isinstance(shape, SurfaceMesh):
+            missing = [*missing_parts(contact_map, shape, floor_m), *doubts_of_top(shape, part.unfelt)]
         shape, share = with_guesses_told(shape, part), part.share
     symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= LEAST_KNOWN_SHARE else None
     if has_ended:

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.doubt.unfelt_top import unfelt_top
 from tactile_lab.slam.shape.selection.unexplained import are_inside
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tactile_lab.slam.shape.surfaces.surface import Contour, LEVEL_SIGMA_m, SurfaceMesh
@@ -62,12 +63,14 @@ class KnownPart:
         share: of the outline's length or the surface's area, 0 to 1.
         distances_m: from each point to the nearest contact on a side that faces the same way, at most
             :data:`REACH_m`, shape (n,).
+        unfelt: where a surface has a top in place of which there may be an opening, shape (n,).
     """
 
     near: Mask
     known: Mask
     share: float
     distances_m: Array
+    unfelt: Mask
 
 
 def known_part(
@@ -83,24 +86,28 @@ def known_part(
     Args:
         shape: object frame.
         contacts: those that the estimate uses, object frame, of the shape's dimension.
-        floor_m: height of the table under a standing object, object frame; None for an object held free.
+        floor_m: height of the table under a standing object, object frame, on which a top may be open; None for an
+            object held free.
         free_m: places that a finger went through, object frame, shape (q, d); a surface that encloses them is not known
             there.
         reach_m: how far from a contact an outline is known; a surface no further than :data:`SURFACE_REACH_m`.
     """
     sides = _outline(shape) if isinstance(shape, Contour) else _surface(shape)
     points, normals = sides.points_m, sides.normals
-    distances = _nearest_alike(sides, contacts)
+    distances, unfelt = _nearest_alike(sides, contacts), np.zeros(len(points), dtype=bool)
     if isinstance(shape, SurfaceMesh):
         near = (distances < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
     else:
         near = distances < reach_m
+    if isinstance(shape, SurfaceMesh) and floor_m is not None:
+        unfelt = unfelt_top(shape, contacts.points_m, contacts.normals, near)
+        near, distances = near & ~unfelt, np.where(unfelt, REACH_m, distances)
     known = near & (shape.sigma_m <= LARGEST_SIGMA_m)
     if isinstance(shape, SurfaceMesh) and floor_m is not None:
         foot = (points[:, 2] < floor_m + LEVEL_SIGMA_m) & (normals[:, 2] < _DOWN)
         known, near = known | foot, near | foot
     share = float(sides.sizes @ known / max(float(sides.sizes.sum()), 1e-12))
-    return KnownPart(near, known, min(share, 1.0), distances)
+    return KnownPart(near, known, min(share, 1.0), distances, unfelt)
 
 
 def with_guesses_told(shape: _Shape, part: KnownPart) -> _Shape:

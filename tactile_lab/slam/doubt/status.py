@@ -29,12 +29,13 @@ DoubtName: TypeAlias = Literal[
     "few-grasps",
     "unknown-size",
     "missing-part",
+    "unfelt-top",
     "rivals",
     "many-heights",
     "symmetry",
 ]
 
-_PARTIAL: tuple[DoubtName, ...] = ("refused-grasps", "few-grasps", "unknown-size", "missing-part")
+_PARTIAL: tuple[DoubtName, ...] = ("refused-grasps", "few-grasps", "unknown-size", "missing-part", "unfelt-top")
 """Doubts with which an estimate is not complete."""
 
 LEAST_KNOWN_SHARE = 0.8

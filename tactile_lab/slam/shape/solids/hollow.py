@@ -19,24 +19,25 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.solids.solid_field import SolidField
-from tactile_lab.slam.shape.surfaces.sampling import mesh_arrays
+from tactile_lab.slam.shape.solids.walls import ON_SURFACE_m, THICKEST_m, Walls
 from tactile_lab.slam.shape.surfaces.surface import Contour, Mask, SurfaceMesh, extract_mesh
 
-_UPWARD, _SIDEWAYS = 0.7, 0.7
-"""Least vertical part of a normal on the rim, and largest of one on a wall."""
+_UPWARD = 0.7
+"""Least vertical part of a normal on the rim."""
 
-_RIM_m, _LEAST_RIM_CONTACTS = 0.020, 3
+_RIM_m = 0.020
+"""Contacts on the rim are no lower below the highest."""
+
 _BELOW_RIM_m, _WITHIN_m = 0.004, 0.008
 """A finger is in a cavity so far below the rim, over what the model takes for solid so far from its sides: not beside a
 neck, over a shoulder.
 """
 
 _RIM_WALL_m, _GRID_m = 0.008, 0.003
-_THICKNESS_m, _LEAST_FLOOR_m = (0.004, 0.010), 0.006
+_THICKNESS_m, _LEAST_FLOOR_m = (0.004, THICKEST_m), 0.006
 """Of walls, none so thin that the grid misses it, and least thickness of the floor."""
 
 _THICKNESS_SIGMA_m, _SIGMA_PER_DEPTH = 0.0015, 0.05
-_OFF_m = 0.006
 
 
 @dataclass(frozen=True)
@@ -105,13 +106,13 @@ class _HollowField:
     def __init__(self, shape: Hollow) -> None:
         mesh = shape.outside
         self._shape, self._body = shape, SolidField(mesh, mesh.sigma_m)
-        self._walls = _walls(mesh, shape.middle_m)
+        self._walls = Walls.of(mesh).facing_away(shape.middle_m)
         self.contacts_m = np.vstack([shape.gpis.contacts_m, mesh.vertices[mesh.vertices.argmin(axis=0)]])
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """The field at points of shape (q, 3)."""
         body = self._body.predict(points_m, gradient=gradient, variance=variance)
-        shape, (away_m, inward) = self._shape, _from_walls(points_m, *self._walls)
+        shape, (away_m, inward) = self._shape, self._walls.away(points_m)
         to_wall_m, to_floor_m = away_m - shape.wall_m, points_m[:, 2] - shape.bottom_m
         is_wall = to_wall_m < to_floor_m
         cavity_m = np.where(is_wall, to_wall_m, to_floor_m)
@@ -134,6 +135,10 @@ class _HollowField:
 def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float) -> FittedShape:
     """A shape with a cavity where fingers went down inside its rim; otherwise the shape itself.
 
+    A lid and a cavity contradict one another: the one that less speaks against is believed, places where a finger came
+    down through the lid, or contacts that the cavity leaves off the surface. Walls are those that face away from the
+    middle of the rim: a model that was told of a finger inside may have a dent there.
+
     Args:
         shape: the most probable model.
         gpis: the field of all contacts.
@@ -143,38 +148,51 @@ def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_
     Raises:
         ShapeError: the shape encloses nothing.
     """
-    heights_m, up = gpis.contacts_m[:, 2], gpis.normals[:, 2] > _UPWARD
-    rim = up & (heights_m > heights_m.max() - _RIM_m)
-    if free_points_m is None or not len(free_points_m) or rim.sum() < _LEAST_RIM_CONTACTS:
+    rim = _on_rim(gpis)
+    if free_points_m is None or not rim.any():
         return shape
-    rim_m, on_rim_m = float(np.median(heights_m[rim])), gpis.contacts_m[rim]
+    rim_m = float(gpis.contacts_m[rim, 2].max())
     low_m = free_points_m[free_points_m[:, 2] < rim_m - _BELOW_RIM_m]
     if not len(low_m):
         return shape
-    mesh = shape.mesh(_GRID_m, floor_m)
-    middle_m = on_rim_m.mean(axis=0)
-    body, walls = SolidField(mesh, 0.0), _walls(mesh, middle_m)
-    low_m = low_m[_surrounded(low_m, np.vstack([on_rim_m, _near_rim(*walls, rim_m)]))]
-    if not len(low_m):
+    mesh, middle_m = shape.mesh(_GRID_m, floor_m), gpis.contacts_m[rim].mean(axis=0)
+    body = SolidField(mesh, 0.0)
+    walls = Walls.of(mesh).facing_away(middle_m)
+    low_m = low_m[_surrounded(low_m, np.vstack([gpis.contacts_m[rim], _near_rim(walls, rim_m)]))]
+    entered_m = low_m[_over_solid(low_m, body, (rim_m + floor_m) / 2)]
+    if not len(entered_m):
         return shape
-    below_m = np.column_stack([low_m[:, :2], np.full(len(low_m), (rim_m + floor_m) / 2)])
-    in_cavity = body.predict(below_m).mean_m < -_WITHIN_m
-    away_m, _ = _from_walls(gpis.contacts_m[up & (heights_m > (rim_m + floor_m) / 2)], *walls)
-    if not in_cavity.any() or away_m.max() > _THICKNESS_m[1]:
-        return shape
-    wall_m = float(np.clip(2 * _from_walls(on_rim_m, *walls)[0].mean(), *_THICKNESS_m))
-    hollow = Hollow(shape, mesh, gpis, middle_m, wall_m, rim_m, float(low_m[in_cavity, 2].min()), floor_m)
-    off_m = np.abs(hollow.field.predict(gpis.contacts_m).mean_m)
-    before_m = np.abs(body.predict(gpis.contacts_m).mean_m)
-    return hollow if np.sum(off_m > _OFF_m) <= np.sum(before_m > _OFF_m) else shape
+    wall_m = float(np.clip(2 * np.median(walls.distances_m(gpis.contacts_m[rim])), *_THICKNESS_m))
+    hollow = Hollow(shape, mesh, gpis, middle_m, wall_m, rim_m, float(entered_m[:, 2].min()), floor_m)
+    against = _off(hollow.field, gpis) - _off(body, gpis)
+    return hollow if against < len(entered_m) else shape
 
 
-def _near_rim(vertices: Array, faces: Array, rim_m: float) -> Array:
+def _on_rim(gpis: Gpis) -> Mask:
+    """Which contacts face up and are among the highest, shape (n,)."""
+    heights_m = gpis.contacts_m[:, 2]
+    return np.asarray((gpis.normals[:, 2] > _UPWARD) & (heights_m > heights_m.max() - _RIM_m))
+
+
+def _near_rim(walls: Walls, rim_m: float) -> Array:
     """Middles of the triangles of walls close below the rim, shape (n, 3): it goes all around, though few places of it
     were touched.
     """
-    middles_m = vertices[faces].mean(axis=1)
-    return np.asarray(middles_m[(middles_m[:, 2] < rim_m) & (middles_m[:, 2] > rim_m - _RIM_WALL_m)])
+    middles_m = walls.middles_m
+    return middles_m[(middles_m[:, 2] < rim_m) & (middles_m[:, 2] > rim_m - _RIM_WALL_m)]
+
+
+def _over_solid(places_m: Array, body: SolidField, height_m: float) -> Mask:
+    """Over which places, shape (q, 3), a body is solid at a height, well inside its sides."""
+    if not len(places_m):
+        return np.zeros(0, dtype=bool)
+    below_m = np.column_stack([places_m[:, :2], np.full(len(places_m), height_m)])
+    return np.asarray(body.predict(below_m).mean_m < -_WITHIN_m)
+
+
+def _off(field: SolidField | _HollowField, gpis: Gpis) -> int:
+    """Number of contacts that are not on a surface."""
+    return int(np.count_nonzero(np.abs(field.predict(gpis.contacts_m).mean_m) > ON_SURFACE_m))
 
 
 def _surrounded(places_m: Array, around_m: Array) -> Mask:
@@ -183,24 +201,3 @@ def _surrounded(places_m: Array, around_m: Array) -> Mask:
         return np.asarray(Delaunay(around_m[:, :2]).find_simplex(places_m[:, :2]) >= 0)
     except QhullError:  # they are in a line
         return np.zeros(len(places_m), dtype=bool)
-
-
-def _walls(mesh: SurfaceMesh, middle_m: Array) -> tuple[Array, Array]:
-    """Vertices and triangles of the walls of a surface that face away from the middle of the rim, shape (3,): a model
-    that was told of a finger inside may have a dent there.
-    """
-    vertices, faces = mesh_arrays(mesh)
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.maximum(np.linalg.norm(normals, axis=1), np.finfo(float).tiny)
-    outward = np.einsum("nk,nk->n", (corners.mean(axis=1) - middle_m)[:, :2], normals[:, :2]) > 0
-    return vertices, np.ascontiguousarray(faces[outward & (np.abs(normals[:, 2]) < _SIDEWAYS * lengths)])
-
-
-def _from_walls(points_m: Array, vertices: Array, faces: Array) -> tuple[Array, Array]:
-    """Distances from walls, shape (q,), and the directions away from them, shape (q, 3)."""
-    import igl  # here, so that importing this module stays quick
-
-    squares, _, nearest_m = igl.point_mesh_squared_distance(np.ascontiguousarray(points_m), vertices, faces)[:3]
-    away_m = np.sqrt(np.atleast_1d(squares))
-    return away_m, (points_m - np.reshape(nearest_m, (-1, 3))) / np.maximum(away_m, 1e-9)[:, None]

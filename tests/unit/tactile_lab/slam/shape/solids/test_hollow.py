@@ -20,13 +20,17 @@ IN_CUP_m = np.array([[0.0, 0.0, 0.070], [0.008, 0.0, 0.066], [-0.005, 0.008, 0.0
 CUP = turned([0, 36, 36, 31, 31, 0], [0, 0, 80, 80, 5, 5])
 
 
-def felt(rim_m: float, on_top: int = 10) -> Gpis:
-    """Contacts on the outer wall at three heights, and so many of ten on the top, so far from the axis."""
+def felt(rim_m: float, on_top: int = 10, more_m: Array | None = None) -> Gpis:
+    """Contacts on the outer wall at three heights, and so many of ten on the top, so far from the axis, and more there,
+    shape (n, 2).
+    """
+    more_m = np.empty((0, 2)) if more_m is None else more_m
     around = np.linspace(0, 2 * np.pi, 10, endpoint=False)
     out = np.column_stack([np.cos(around), np.sin(around), np.zeros(10)])
     walls = [RADIUS_m * out + [0, 0, z] for z in (0.02, 0.045, 0.07)]
-    points_m = np.vstack([*walls, rim_m * out[:on_top] + [0, 0, HIGH_m]])
-    normals = np.vstack([out, out, out, np.tile([0.0, 0.0, 1.0], (on_top, 1))])
+    beside_m = np.column_stack([more_m, np.full(len(more_m), HIGH_m)])
+    points_m = np.vstack([*walls, rim_m * out[:on_top] + [0, 0, HIGH_m], beside_m])
+    normals = np.vstack([out, out, out, np.tile([0.0, 0.0, 1.0], (on_top + len(more_m), 1))])
     return Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
 
 
@@ -48,6 +52,26 @@ def test_a_cup_is_hollow_though_its_rim_was_touched_on_one_side_only() -> None:
     hollow = shape_of(felt(RADIUS_m - WALL_m / 2, on_top=4), IN_CUP_m)
     assert isinstance(hollow, Hollow)
     assert np.mean(distances_to_mesh(hollow.mesh().vertices, CUP)) < 0.0025
+
+
+@pytest.mark.parametrize("on_top", [1, 2])
+def test_a_cup_is_hollow_though_its_rim_was_touched_at_one_place_or_two(on_top: int) -> None:
+    hollow = shape_of(felt(RADIUS_m - WALL_m / 2, on_top), IN_CUP_m)
+    assert isinstance(hollow, Hollow)
+
+
+def test_a_contact_on_the_rim_that_is_placed_wrongly_makes_no_lid() -> None:
+    misplaced_m = np.array([[RADIUS_m - 0.0108, 0.002]])
+    hollow = shape_of(felt(RADIUS_m - WALL_m / 2, more_m=misplaced_m), IN_CUP_m)
+    assert isinstance(hollow, Hollow)
+    assert hollow.wall_m == pytest.approx(WALL_m, abs=0.002)
+
+
+def test_what_more_fingers_came_down_into_than_met_a_lid_is_open() -> None:
+    met_m = np.array([[0.004, 0.006], [-0.010, 0.002], [0.0, -0.012]])
+    for met in (1, 2):
+        assert isinstance(shape_of(felt(RADIUS_m - WALL_m / 2, more_m=met_m[:met]), IN_CUP_m), Hollow)
+    assert not isinstance(shape_of(felt(RADIUS_m - WALL_m / 2, more_m=met_m), IN_CUP_m), Hollow)
 
 
 def test_a_model_that_was_told_of_the_fingers_is_hollow_as_well() -> None:
