@@ -21,6 +21,7 @@ from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m, lo
 from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
 from tactile_lab.autonomy.standing.side_planner import slides_up_to_m
+from tactile_lab.autonomy.standing.storeys import Storeys
 
 _TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.04, 0.025, 0.025
 _INSIDE_m = 0.008
@@ -106,15 +107,18 @@ class TouchPlanner(ActionPlanner):
 
     def _sides(self) -> Iterator[StandingCandidate]:
         """Every side that the arm can come to, in lanes, at heights where the object is not tipped over."""
+        storeys, share = self.felt.storeys, _SQUARELY if self.felt.is_round else 1.0
         for yaw_rad in self.felt.yaws(self.yaw_window_rad, _ASKEW_rad):
             for side in SIDES:
                 lowest_m = lowest_touch_m(side, self.settings.side_heights_m, self.hand)
-                places = self._on_side(yaw_rad, sideways(COLUMN.closing, side), lowest_m)
+                places = self._on_side(storeys, share, yaw_rad, sideways(COLUMN.closing, side), lowest_m)
                 yield from self._going_on([one for one in places if self._is_open(one)])
 
-    def _on_side(self, yaw_rad: float, name: str, lowest_m: float) -> Iterator[StandingCandidate]:
-        box, storeys = self.felt.standing_box, self.felt.storeys
-        across = np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
+    def _on_side(
+        self, storeys: Storeys, share: float, yaw_rad: float, name: str, lowest_m: float
+    ) -> Iterator[StandingCandidate]:
+        """Touches from one side, in lanes that far from the middle as a share of the half width."""
+        box, across = self.felt.standing_box, np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.hand)
         if not self.felt.may_be_pushed(way):
             return
@@ -123,20 +127,13 @@ class TouchPlanner(ActionPlanner):
         low_m, laid_m = (lowest_m + 1e-9, 0.0) if self.felt.is_slender(way) else (np.inf, up_to_m)
         for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m).tolist():
             slides, met = height_m < min(up_to_m, low_m), storeys.at(height_m)
-            for lane_m in self._lanes_m(met, across):
+            for lane_m in _lanes_m(met, across, share):
                 is_beyond = met.foot_along_m(across) - abs(lane_m) > _CLOSINGS_REACH_m
                 if slides or (is_beyond and self._hardly_leans(height_m, foot_m)):
                     lane = met.centre_m + lane_m * across
                     front = lane - met.way_out_m(lane, -way) * way
                     place = TouchPlace(GraspFrame(float(front[0]), float(front[1]), yaw_rad), height_m, laid_m)
                     yield self._at(place, name)
-
-    def _lanes_m(self, box: StandingBox, across: Array) -> list[float]:
-        """How far aside from a box's middle, along a horizontal unit vector, shape (2,), a finger comes to its side."""
-        wide_m = box.half_along_m(across) * (_SQUARELY if self.felt.is_round else 1.0)
-        lanes_m = _places(wide_m, _LANES_APART_m)
-        places_m = np.column_stack([box.centre_m + lanes_m[:, None] * across, np.full(len(lanes_m), box.size_m[2] / 2)])
-        return [float(lane) for lane in lanes_m[box.distances_m(places_m) <= -_INSIDE_m]]
 
     def _at(self, place: TouchPlace, name: str) -> StandingCandidate:
         """A touch at a place on a side by a closing of that name."""
@@ -208,6 +205,15 @@ def _places(half_m: float, apart_m: float) -> Array:
     """Evenly spread from the middle, as far as a face reaches from there."""
     count = int(max(0.0, half_m - _INSIDE_m) // apart_m)
     return np.asarray(apart_m * np.arange(-count, count + 1))
+
+
+def _lanes_m(box: StandingBox, across: Array, share: float) -> list[float]:
+    """How far aside from a box's middle, along a horizontal unit vector, shape (2,), a finger comes to its side: up to
+    a share of its half width.
+    """
+    lanes_m = _places(share * box.half_along_m(across), _LANES_APART_m)
+    places_m = np.column_stack([box.centre_m + lanes_m[:, None] * across, np.full(len(lanes_m), box.size_m[2] / 2)])
+    return [float(lane) for lane in lanes_m[box.distances_m(places_m) <= -_INSIDE_m]]
 
 
 def _at(box: StandingBox, along_m: float, across_m: float) -> tuple[float, float]:

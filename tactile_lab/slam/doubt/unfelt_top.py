@@ -42,7 +42,8 @@ def unfelt_top(mesh: SurfaceMesh, points_m: Array, normals: Array, near: Mask) -
     walls = Walls.of(mesh)
     away_m, ways = walls.away(mesh.vertices)
     away_m = np.where((mesh.normals[:, 2] > _UPWARD) & (ways[:, 2] > _SUNK), away_m, 0.0)
-    parts, inner = _connected(mesh, away_m > THICKEST_m), away_m > THICKEST_m
+    inner = away_m > THICKEST_m
+    parts = _connected(mesh, inner)
     on_lid = points_m[(normals[:, 2] > _UPWARD) & (walls.distances_m(points_m) > _LID_m)]
     wide = np.intersect1d(parts[away_m > _LID_m + _FINGERTIP_m], parts[inner & near])
     return inner & np.isin(parts, np.setdiff1d(wide, _touched(mesh.vertices, parts, inner, on_lid)))
