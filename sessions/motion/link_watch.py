@@ -34,6 +34,9 @@ _STILL_WRIST = (4.0, 60.0, 5)
 _BOTH = (60.0, 2)
 """The same for the wrist's two motors together: jerks show in one of them, 51 counts at most in both."""
 
+_BOTH_MOVING = 3
+"""Readings in a row for the wrist while fingertips are laid on: up to two show what they feel."""
+
 _MOVING = (60.0, 2)
 """The same for the motor of a finger that moves a little, as when it is laid on something: what its tip feels is 0.7 N
 there, and shows as 45 counts at most; 1 N on a link shows as 90."""
@@ -84,8 +87,10 @@ class LinkWatch:
 
     @property
     def is_leaning(self) -> bool:
-        """Whether something pushes on a link of a finger that is moved a little."""
-        return self._leaning >= _MOVING[1]
+        """Whether something pushes on a link of a finger that is moved a little; or harder on the whole hand than all
+        fingertips that are laid on: then the wrist's motors alone may show it.
+        """
+        return self._leaning >= _MOVING[1] or self.is_touched or self._both >= _BOTH_MOVING
 
     @property
     def pushed(self) -> NDArray[np.bool_]:

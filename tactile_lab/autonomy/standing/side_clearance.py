@@ -83,12 +83,23 @@ class StandingBox:
         ways_m = [(np.sign(w) * size / 2 - at) / w for at, w, size in zip(place_m, way, self.size_m, strict=False) if w]
         return float(min(ways_m))
 
+    def outside_m(self, places_m: Array, is_round: bool) -> Array:
+        """Of world places x, y (n, 2) from its outline, or from the circle in it, negative inside, shape (n,)."""
+        if is_round:
+            return np.asarray(np.linalg.norm(places_m - self.centre_m, axis=1) - np.mean(self.size_m[:2]) / 2)
+        return _signed(self._beyond_m(places_m))
+
     def distances_m(self, places_m: Array) -> Array:
         """Of world places (..., 3) to its surface, negative inside, shape (...)."""
+        half_m = self.size_m[2] / 2
+        upward_m = np.abs(places_m[..., 2] - half_m) - half_m
+        return _signed(np.concatenate([self._beyond_m(places_m[..., :2]), upward_m[..., None]], axis=-1))
+
+    def _beyond_m(self, places_m: Array) -> Array:
+        """How far world places x, y (..., 2) lie beyond its sides along its own two axes, same shape."""
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
-        x, y, z = np.moveaxis(places_m - [self.x_m, self.y_m, self.size_m[2] / 2], -1, 0)
-        beyond = np.abs(np.stack([c * x + s * y, -s * x + c * y, z], axis=-1)) - np.array(self.size_m) / 2
-        return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0))
+        x, y = np.moveaxis(places_m - self.centre_m, -1, 0)
+        return np.abs(np.stack([c * x + s * y, -s * x + c * y], axis=-1)) - np.array(self.size_m[:2]) / 2
 
 
 @dataclass(frozen=True)
@@ -145,6 +156,11 @@ def expected_closing(plan: GraspPlan, hand: HandShape, solid: Solid, surely: Sol
             way = plan.frame.pose.rotation().rotate(table.path(finger).direction)
             touches[finger] = tips_world_m[stops, index] + hand.radius_m * np.asarray(way)
     return ExpectedClosing(touches, frozenset(stays_open))
+
+
+def _signed(beyond_m: Array) -> Array:
+    """Distance to a box, negative inside, of places that lie so far beyond its faces along its axes, last axis."""
+    return np.asarray(np.linalg.norm(np.maximum(beyond_m, 0.0), axis=-1) + np.minimum(beyond_m.max(axis=-1), 0.0))
 
 
 def _to_world(plan: GraspPlan, places_m: Array) -> Array:

@@ -27,6 +27,12 @@ _TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.04, 0.025, 0.025
 _INSIDE_m = 0.008
 """From the edges of a face to the places where it is touched."""
 
+_TAP_TURNS_rad = np.radians([0.0, 30.0, -30.0, 60.0, -60.0])
+"""Of a tap, from the middle of the arm's range."""
+
+_BESIDE_m = 0.004
+"""From the top's edge to a fingertip that passes beside it in a tap: a box that was felt is not known better."""
+
 _ASKEW_rad = np.radians(20.0)
 """A side that the arm cannot turn to squarely is touched so much from aside: fingertips do not slip yet."""
 
@@ -83,25 +89,28 @@ class TouchPlanner(ActionPlanner):
     # --- from above ----------------------------------------------------------------------------------------------
 
     def _taps(self) -> Iterator[StandingCandidate]:
-        """Side by side over the top."""
-        box, yaw = self.felt.storeys.boxes[-1], float(np.mean(self.yaw_window_rad))
+        """Side by side over the top, turned so that no finger comes down on an edge."""
+        box, is_round, (low, high) = self.felt.storeys.boxes[-1], self.felt.is_round, self.yaw_window_rad
+        yaws_rad = [yaw for yaw in (low + high) / 2 + _TAP_TURNS_rad if low <= yaw <= high]
         for along_m in _places(box.size_m[0] / 2, _TAPS_APART_m):
             for across_m in _places(box.size_m[1] / 2, _TAPS_APART_m):
-                x, y = _at(box, along_m, across_m)
-                frame = GraspFrame(x, y, yaw)
-                if touches := self._tapped(frame, box):
-                    yield self._candidate(frame, TAP.closing, TAP_HEIGHT_m, touches, "tap on the top")
+                for yaw_rad in yaws_rad:
+                    frame = GraspFrame(*_at(box, along_m, across_m), float(yaw_rad))
+                    if touches := self._tapped(frame, box, is_round):
+                        yield self._candidate(frame, TAP.closing, TAP_HEIGHT_m, touches, "tap on the top")
 
-    def _tapped(self, frame: GraspFrame, box: StandingBox) -> dict[str, Array]:
-        """Where fingertips meet the top, by finger."""
-        table, shrunk = closing(TAP.closing, TAP_HEIGHT_m, self.hand), box.grow(-_INSIDE_m / 2, 0.0)
-        found = {}
-        for finger in table.fingers:
-            place = np.asarray(frame.pose.transformFrom(table.path(finger).centre_m(TAP.progress[finger])))
-            place[2] = box.size_m[2]
-            if shrunk.distances_m(place) <= 1e-9 and not self.felt.is_open(place):
-                found[finger] = place
-        return found
+    def _tapped(self, frame: GraspFrame, box: StandingBox, is_round: bool) -> dict[str, Array]:
+        """Where fingertips meet the top, by finger; nothing where one would come down on an edge, and lean a link."""
+        table = closing(TAP.closing, TAP_HEIGHT_m, self.hand)
+        centres_m = [table.path(finger).centre_m(TAP.progress[finger]) for finger in table.fingers]
+        places_m = np.array([frame.pose.transformFrom(centre_m) for centre_m in centres_m])
+        places_m[:, 2] = box.size_m[2]
+        outside_m = box.outside_m(places_m[:, :2], is_round)
+        meets = outside_m < -_INSIDE_m / 2
+        if (outside_m[~meets] < self.hand.radius_m + _BESIDE_m).any():
+            return {}
+        met = zip(table.fingers, places_m, meets, strict=True)
+        return {finger: place for finger, place, is_met in met if is_met and not self.felt.is_open(place)}
 
     # --- from the side -------------------------------------------------------------------------------------------
 

@@ -13,10 +13,12 @@ from drivers.shadow.model.hand_form import HandForm
 from drivers.shadow.model.motors import DRIVEN_JOINTS
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.probing.bounding_box import BoundingBox
+from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
 from sessions.motion.safety import SafetySettings
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.planner import StandingPlanner, Standstill
+from tactile_lab.autonomy.standing.side_clearance import StandingBox
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
 
 TIP = HandShape()
@@ -120,6 +122,25 @@ def test_fingers_are_laid_on_together_as_high_as_a_wide_object_slides() -> None:
     low, tall = sides(felt(0.09, 0.09, 0.16)), sides(felt(0.04, 0.04, 0.16))
     assert {len(one.touches) for one in low} == {3, 4}
     assert {len(one.touches) for one in tall} <= {1}
+
+
+def test_no_finger_of_a_tap_comes_down_on_an_edge() -> None:
+    known = felt(0.09, 0.08)
+    box, taps = known.storeys.boxes[-1], list(planner(known)._taps())
+    table = closing(TAP.closing, TAP_HEIGHT_m, TIP)
+    assert {round(one.plan.frame.yaw_rad, 2) for one in taps} != {0.0}
+    for one in taps:
+        tips_m = [table.path(finger).centre_m(TAP.progress[finger]) for finger in table.fingers]
+        places_m = np.array([one.plan.frame.pose.transformFrom(tip_m)[:2] for tip_m in tips_m])
+        outside_m = box.outside_m(places_m, False)
+        assert np.all((outside_m < -0.004) | (outside_m > TIP.radius_m + 0.004))
+
+
+def test_what_is_round_ends_before_its_box_does() -> None:
+    box = StandingBox(0.1, -0.2, 0.3, (0.08, 0.08, 0.05))
+    corner_m = box.centre_m + 0.05 * np.array([[np.cos(0.3 + np.pi / 4), np.sin(0.3 + np.pi / 4)]])
+    assert box.outside_m(corner_m, False)[0] < 0.0
+    assert box.outside_m(corner_m, True)[0] == pytest.approx(0.01)
 
 
 def test_where_a_tap_met_nothing_the_top_is_open_and_no_fingertip_is_expected_there() -> None:
