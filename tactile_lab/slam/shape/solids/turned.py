@@ -42,6 +42,10 @@ _SECTION_GRID_m = 0.001
 _SPACING = 1.5
 _FOOT_SHARE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, 0.2, 0.006
 """As for the standing field: how much of the height is mirrored at the table, and how far inward its walls move."""
+_WIDENS, _LOWEST = 0.6, 5
+"""By how much at most a foot widens as it goes down, and so many contacts tell where, and whether they lean more."""
+_DEPTHS, _BEYOND_m = 6, np.arange(0.004, 0.08, 0.004)
+"""Of places beside the foot: how many one below the other, and how far out."""
 _SURE_SIGMAS = 2.0
 """Walls continue below the table at their own inclination only if it differs from upright by this many sigmas."""
 
@@ -100,8 +104,11 @@ class Turned:
     def profile(self) -> Gpis:
         """The field of the whole section through the axis, with all that is known of places without contacts."""
         section = _both_halves(self.half, self.floor_m)
-        section = section if self.floor_m is None else standing(section, self.floor_m)
-        return in_one_piece(outside_at(section, np.vstack([self.free_m, self.free_m * [-1, 1]])), _SECTION_GRID_m)
+        free_m = self.free_m
+        if self.floor_m is not None:
+            section = standing(section, self.floor_m)
+            free_m = np.vstack([free_m, beside_foot(self.half, self.floor_m)])
+        return in_one_piece(outside_at(section, np.vstack([free_m, free_m * [-1, 1]])), _SECTION_GRID_m)
 
     def half_of(self, contacts: WeightedContacts, chosen: NDArray[np.bool_]) -> Gpis:
         """The field of the profile of some contacts in space, about this axis and with this kernel."""
@@ -251,6 +258,23 @@ def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:
     vague = _INSET_SLOPE * np.sqrt(max(len(at_table), 1))
     at_table[:, 4:] = np.hypot(at_table[:, 4:], vague * np.column_stack([above_m[is_wall], np.ones(len(at_table))]))
     return below, at_table
+
+
+def beside_foot(half: Gpis, floor_m: float) -> Array:
+    """Places between the lowest contacts of outer walls and the table that a foot does not reach, shape (q, 2).
+
+    Below them a wall goes outward by no more than a share of how far it goes down, or as it leans. A field alone may
+    spread out over the table, where it is its own mirror image.
+    """
+    walls = np.flatnonzero(half.normals[:, 0] > SIDEWAYS)
+    lowest = walls[np.argsort(half.contacts_m[walls, 1])[:_LOWEST]]
+    if len(lowest) == 0:
+        return np.empty((0, 2))
+    lean = half.normals[lowest].mean(axis=0)
+    (edge_m, _), low_m = half.contacts_m[lowest].max(axis=0), half.contacts_m[lowest, 1].min()
+    depths_m = np.linspace(0.0, max(low_m - floor_m, 0.0), _DEPTHS)
+    down_m, beyond_m = (each.ravel() for each in np.meshgrid(depths_m, _BEYOND_m))
+    return np.column_stack([edge_m + max(_WIDENS, lean[1] / lean[0]) * down_m + beyond_m, low_m - down_m])
 
 
 def _unit(vectors: Array) -> Array:

@@ -17,6 +17,7 @@ from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.shape.planar.sides import features, slopes
 from tactile_lab.slam.shape.selection.planar_choice import rounded_of
+from tactile_lab.slam.shape.solids.prism import on_walls
 from tactile_lab.slam.shape.surfaces.surface import extract_contour
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
@@ -38,13 +39,16 @@ def rounded_outline(contact_map: ContactMap) -> RoundedOutline:
 
 
 def smoothed_with_sides(contact_map: ContactMap, noise: MotionNoise) -> ContactMap | None:
-    """Divide a map's contacts into sides, and let poses, sides and the division settle; None if no side is round.
+    """Divide a map's contacts into sides, and let poses, sides and the division settle; None if no side is round, or
+    none was touched.
 
     Args:
         contact_map: contacts in the plane, or in space, of which those on upright walls count.
         noise: of the motion model.
     """
     if "round sides" in contact_map.settings.without or contact_map.space is not PLANAR:
+        return None
+    if contact_map.dimension == 3 and not on_walls(contact_map.contacts_world.normals).any():
         return None
     best: tuple[float, ContactMap] | None = None
     seen = contact_map if contact_map.dimension == 2 else walls_from_above(contact_map)

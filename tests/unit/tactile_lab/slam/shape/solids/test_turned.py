@@ -14,7 +14,7 @@ from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
 from tactile_lab.slam.shape.metrics.metrics import mesh_errors
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.revolving import generatrix, revolve
-from tactile_lab.slam.shape.solids.turned import Turned
+from tactile_lab.slam.shape.solids.turned import Turned, beside_foot
 from tactile_lab.slam.shape.surfaces.surface import Contour
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
 from tests.support.solid_examples import box_mesh, contacts_on, field_on
@@ -81,6 +81,18 @@ def test_a_tapered_wall_goes_on_to_the_table_as_it_is_inclined() -> None:
     surface = Turned.fit(field, 0.0).mesh()
     foot = surface.vertices[surface.vertices[:, 2] < 0.004]
     assert np.linalg.norm(foot[:, :2], axis=1).max() < 0.0225
+
+
+@pytest.mark.parametrize(("lean", "widens"), [(0.0, 0.6), (1.5, 1.5)])
+def test_a_foot_is_no_wider_than_its_lowest_contacts_and_their_lean_allow(lean: float, widens: float) -> None:
+    heights_m = np.linspace(0.02, 0.08, 12)
+    walls_m = np.column_stack([0.05 - lean * (heights_m - 0.02), heights_m])
+    normals = np.tile([1.0, lean] / np.hypot(1.0, lean), (12, 1))
+    half = Gpis.fit(walls_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad)
+    beside_m = beside_foot(half, 0.0)
+    assert beside_m[:, 1].min() == pytest.approx(0.0, abs=1e-9)
+    assert beside_m[:, 1].max() < 0.021
+    assert np.all(beside_m[:, 0] > 0.05 + widens * (0.02 - beside_m[:, 1]))
 
 
 def test_a_box_has_no_axis() -> None:

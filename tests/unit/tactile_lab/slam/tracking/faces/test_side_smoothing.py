@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from drivers.core.contacts import Contact
 from tactile_lab.experiments.data import planar_data, second_family, spatial_data
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
@@ -32,6 +35,10 @@ def shaken(contact_map: ContactMap) -> ContactMap:
     shake = np.random.default_rng(0).normal(size=contact_map.rows.shape) * [0.002, 0.002, 0.03]
     shake[0] = 0.0
     return contact_map.with_rows(np.asarray(contact_map.rows + shake))
+
+
+def on_top(contact: Contact) -> Contact:
+    return replace(contact, normal_world=np.array([0.0, 0.0, 1.0]))
 
 
 def value(contact_map: ContactMap) -> float:
@@ -92,6 +99,12 @@ def test_round_walls_are_smoothed_as_such_in_space_too() -> None:
     off_m = [np.linalg.norm(each.rows[1:, :2] - true.rows[1:, :2], axis=1) for each in (found, start)]
     assert np.median(off_m[0]) < 0.7 * np.median(off_m[1])
     assert smoothed_with_sides(placed_truly(spatial_data.simulate("box-12x6x6", 0, count=8), 3), NOISE) is None
+
+
+def test_an_object_that_was_touched_on_its_top_alone_has_no_sides() -> None:
+    flat = spatial_data.simulate("box-12x6x6", 0, count=3)
+    up = [replace(grasp, contacts=tuple(map(on_top, grasp.contacts))) for grasp in flat.grasps]
+    assert smoothed_with_sides(placed_truly(replace(flat, grasps=up), 3), NOISE) is None
 
 
 def test_a_grasp_on_a_round_wall_alone_may_be_turned_about_its_axis() -> None:
