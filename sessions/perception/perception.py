@@ -249,7 +249,7 @@ class Perception:
                 self._probed = Probed()
                 return None
             case EventKind.HOLD_END:
-                self._end_hold(event.stamp_ns)
+                self._end_hold()
                 return None
             case EventKind.TRUTH_FRAME:
                 return self._truth_frame()
@@ -264,9 +264,8 @@ class Perception:
             return None
         return self._scales.event(event, self.grasp_count - 1)
 
-    def _end_hold(self, stamp_ns: int) -> None:
+    def _end_hold(self) -> None:
         carry = self.held.end_hold()
-        self.held.on_open(stamp_ns)
         self._carried.end(self.hand.world_T_palm, carry)
         self._hearing.on_left()
         if carry is not None:

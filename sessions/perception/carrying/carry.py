@@ -143,7 +143,7 @@ class CarryOdometry:
         """
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
         pushed = links.pushed_s**_FARTHER_THE_LONGER
-        causes = self._scale * np.array([excess_N, pushed, links.landed_s, float(links.opened_s > 0.0)])
+        causes = self._scale * np.array([excess_N, pushed, links.landed_s])
         translation_m = np.linalg.norm([sigma.translation_m, *causes * noise.after_m])
         rotation_rad = np.linalg.norm([sigma.rotation_rad, *causes * noise.after_rad])
         return StepSigma(float(translation_m), float(rotation_rad))
@@ -200,9 +200,10 @@ class CarryOdometry:
 
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
         noise, held = self.noise, Roundness.of(steps, balance)
-        far_m, far_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2]
-        while_held_m = noise.least_m + noise.spread_m * far_m + noise.slip_m * np.hypot(*slip[:2])
-        while_held_rad = noise.least_rad + noise.spread_rad * far_rad + noise.slip_rad * abs(slip[2])
+        far_m, far_rad, turned_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2], abs(slip[2])
+        slipped_m = noise.slip_m * np.hypot(*slip[:2]) + noise.turned_m * turned_rad
+        while_held_m = noise.least_m + noise.spread_m * far_m + slipped_m
+        while_held_rad = noise.least_rad + noise.spread_rad * far_rad + noise.turned_rad * turned_rad**2
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
         parts_m = [
             while_held_m,

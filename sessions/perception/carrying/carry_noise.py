@@ -14,12 +14,10 @@ class LinkTimes:
     Attributes:
         pushed_s: while the hand closed again.
         landed_s: while it came down before.
-        opened_s: while it opened.
     """
 
     pushed_s: float = 0.0
     landed_s: float = 0.0
-    opened_s: float = 0.0
 
 
 UNPUSHED = LinkTimes()
@@ -29,12 +27,14 @@ UNPUSHED = LinkTimes()
 @dataclass(frozen=True)
 class CarryNoise:
     """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83,
-    121).
+    121, 144).
 
     Attributes:
         least_m, least_rad: of any carry.
         spread_m, spread_rad: share of the differences between the answers of other assumptions about friction.
-        slip_m, slip_rad: share of the slip itself.
+        slip_m: share of the slip itself.
+        turned_m, turned_rad: of the turn by which it slipped, per radian, and of its square: contacts that slide far
+            are not where the balance has them.
         round_rad: share of the hand's turn that a round object may be off by, over the fingertips beyond two.
         roll_m: how far an object whose sides lean rolls or rocks when it is let go and grasped, over the sine.
         let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
@@ -43,42 +43,40 @@ class CarryNoise:
         closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
         links_m, links_rad: where links pushed for a second meanwhile; grows with the power 1.5 of that time.
         landed_m_s, landed_rad_s: for each second in which links were on the object when the hand came down before.
-        opened_m, opened_rad: where links pushed while the hand opened.
         stood_m, stood_rad: of an object that was not carried, by touches and closings that should not move it.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
             object resisted.
     """
 
-    least_m: float = 0.0001
-    least_rad: float = float(np.deg2rad(0.1))
-    spread_m: float = 0.65
-    spread_rad: float = 0.19
-    slip_m: float = 0.0128
-    slip_rad: float = 0.05
-    round_rad: float = 0.083
-    roll_m: float = 0.0034
-    let_go_m_N: float = 0.00006
-    let_go_rad_N: float = float(np.deg2rad(0.07))
+    least_m: float = 0.000035
+    least_rad: float = float(np.deg2rad(0.13))
+    spread_m: float = 0.45
+    spread_rad: float = 0.12
+    slip_m: float = 0.024
+    turned_m: float = 0.0017
+    turned_rad: float = 0.8
+    round_rad: float = 0.07
+    roll_m: float = 0.0031
+    let_go_m_N: float = 0.00008
+    let_go_rad_N: float = float(np.deg2rad(0.05))
     pushed_m_N: float = 0.001
     pushed_rad_N: float = float(np.deg2rad(0.5))
     closed_m_N: float = 0.003
     closed_rad_N: float = float(np.deg2rad(1.9))
-    links_m: float = 0.0043
-    links_rad: float = float(np.deg2rad(3.1))
-    landed_m_s: float = 0.007
-    landed_rad_s: float = float(np.deg2rad(10.0))
-    opened_m: float = 0.0004
-    opened_rad: float = float(np.deg2rad(0.5))
+    links_m: float = 0.0049
+    links_rad: float = float(np.deg2rad(2.0))
+    landed_m_s: float = 0.005
+    landed_rad_s: float = float(np.deg2rad(5.0))
     stood_m: float = 0.00025
     stood_rad: float = float(np.deg2rad(0.3))
     unseen: float = 0.5
 
     @property
-    def after_m(self) -> tuple[float, float, float, float]:
-        """Of what happens once the hand lets go: net force, links that push, links that land, links while it opens."""
-        return self.closed_m_N, self.links_m, self.landed_m_s, self.opened_m
+    def after_m(self) -> tuple[float, float, float]:
+        """Of what happens once the hand lets go: net force, links that push, links that land."""
+        return self.closed_m_N, self.links_m, self.landed_m_s
 
     @property
-    def after_rad(self) -> tuple[float, float, float, float]:
+    def after_rad(self) -> tuple[float, float, float]:
         """The same of the turn."""
-        return self.closed_rad_N, self.links_rad, self.landed_rad_s, self.opened_rad
+        return self.closed_rad_N, self.links_rad, self.landed_rad_s

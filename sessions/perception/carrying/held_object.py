@@ -19,9 +19,6 @@ from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.carrying.slip import Slip, slip
 from sessions.perception.touch_capture import Measured
 
-_OPENING_ns = 1_200_000_000
-"""The hand has let go by then, and has not begun to travel."""
-
 
 class HeldObject:
     """Collects the readings of hand and fingertips from a capture on, and estimates the carry when a hold ends.
@@ -44,11 +41,11 @@ class HeldObject:
         motors: MotorMap | None = None,
     ) -> None:
         self.fingertips = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
-        self._record, self._descent, self._opening = (CarryRecord(self.fingertips) for _ in range(3))
+        self._record, self._descent = (CarryRecord(self.fingertips) for _ in range(2))
         self.odometry = CarryOdometry(self.fingertips, side, scale)
         """Estimates the carries."""
 
-        self._from_ns, self._tared_ns, self._opened_ns, self._side = 0, 0, 0, side
+        self._from_ns, self._tared_ns, self._side = 0, 0, side
         self._links = None if motors is None else LinkPushes(motors, self.fingertips, side)
         self.delay = ForceDelay(self.fingertips, side)
         """How late forces arrive."""
@@ -56,8 +53,6 @@ class HeldObject:
         """How long links pushed while the hand closed for the last capture."""
         self.landed_s, self._is_grasped = 0.0, False
         """How long they were on the object while the hand came down for it."""
-        self.opened_s = 0.0
-        """How long they pushed while the hand opened after the last hold."""
         self.closing_N = 0.0
         """Largest net force of the fingertips along the table while the hand closed for the last capture.
 
@@ -78,7 +73,7 @@ class HeldObject:
 
     @property
     def _records(self) -> tuple[CarryRecord, ...]:
-        return self._record, self._descent, self._opening
+        return self._record, self._descent
 
     def on_hand(
         self, stamp_ns: int, joints_rad: Array, world_T_forearm: Array, motor_counts: Array | None = None
@@ -90,7 +85,6 @@ class HeldObject:
 
     def on_tare(self, stamp_ns: int) -> None:
         """The hand is above the object and free, and comes down for it; or it has risen to come down again."""
-        self._have_opened()
         self._come_down(stamp_ns)
         self._record.end()
         if self._is_grasped:
@@ -98,14 +92,6 @@ class HeldObject:
         if self._links is not None:
             self._tared_ns = stamp_ns
             self._descent.begin()
-
-    def _have_opened(self) -> None:
-        """Whatever links did just after the hold counts; later the hand rises, and its motors work for that."""
-        opening = self._opening.since(self._opened_ns) if self._opening.is_open else None
-        opening = None if opening is None else opening.until(self._opened_ns + _OPENING_ns)
-        if opening is not None and self._links is not None:
-            self.opened_s = self._links.opened_s(opening)
-        self._opening.end()
 
     def _come_down(self, until_ns: int) -> None:
         """Whatever links landed on from the tare until now counts."""
@@ -117,7 +103,6 @@ class HeldObject:
 
     def on_close(self, stamp_ns: int) -> None:
         """The fingers begin to close; the object may be pushed."""
-        self._have_opened()
         self._come_down(stamp_ns)
         self._from_ns = stamp_ns
         self._record.begin()
@@ -173,7 +158,7 @@ class HeldObject:
 
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
-        pushes = LinkTimes(self.pushed_s, self.landed_s, self.opened_s)
+        pushes = LinkTimes(self.pushed_s, self.landed_s)
         return None if sigma is None else self.odometry.closed(sigma, self.closing_N, pushes)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
@@ -183,9 +168,3 @@ class HeldObject:
         if until_ns is None:
             self._record.end()
         return self.carry
-
-    def on_open(self, stamp_ns: int) -> None:
-        """The hold has ended, and the hand begins to open; links may push the object."""
-        self._opened_ns, self.opened_s = stamp_ns, 0.0
-        if self._links is not None:
-            self._opening.begin()

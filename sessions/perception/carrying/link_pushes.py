@@ -45,8 +45,6 @@ _LEAST_COUNTS, _SIGMAS = 14.0, 4.0
 """Of a push: more than this, and more than so many robust standard deviations of the free motions."""
 _PUSH_SAMPLES = 6
 """In a row."""
-_OPENED_COUNTS = 60.0
-"""Of a push while the hand opens."""
 _LANDED_COUNTS, _STILL_rad_s = 30.0, 0.15
 """Of a landing; open fingers that come down freely stay within 30 counts."""
 _FIT_SAMPLES, _FITS = 20, 6
@@ -92,18 +90,6 @@ class LinkPushes:
         free = _FreeMotions.of(self._closings)
         return self._time_s((free.off(newest) > free.limits) & newest.usable)
 
-    def opened_s(self, samples: CarrySamples) -> float:
-        """How long links of untouched fingers pushed while the hand opened, the fingers' times added.
-
-        Fingers that open are faster than those that close, and those tell less of how they move freely: nothing of a
-        motor that hardly moved in them.
-        """
-        if not self._closings or samples.motor_counts is None or np.isnan(samples.motor_counts).any():
-            return 0.0
-        free, opening = _FreeMotions.of(self._closings), self._closing(samples, samples.motor_counts)
-        pushes = free.off(opening) > np.maximum(_OPENED_COUNTS, free.limits * free.leverage(opening))
-        return self._time_s(pushes & opening.usable)
-
     def landed_s(self, samples: CarrySamples) -> float:
         """How long links were on something while the open hand came down, the fingers' times added."""
         if samples.motor_counts is None or np.isnan(samples.motor_counts).any():
@@ -138,12 +124,10 @@ class _FreeMotions:
     Attributes:
         coefficients: of the terms, shape (20, 4).
         limits: counts beyond them that are a push, shape (20,); infinite for a motor that too little is known of.
-        spread: covariance of the coefficients for counts that scatter by one, shape (20, 4, 4).
     """
 
     coefficients: Array
     limits: Array
-    spread: Array
 
     @classmethod
     def of(cls, closings: deque[_Closing]) -> _FreeMotions:
@@ -164,15 +148,11 @@ class _FreeMotions:
             weights = usable / (1 + (off / width[:, None]) ** 2)
         enough = number >= _FIT_SAMPLES / _EVERY
         limits = np.where(enough, np.maximum(_LEAST_COUNTS, _SIGMAS * scatter), np.inf)
-        return cls(coefficients, limits, np.linalg.inv(normal))
+        return cls(coefficients, limits)
 
     def off(self, closing: _Closing) -> Array:
         """By how much the counts are off, shape (n, 20)."""
         return np.asarray(np.abs(closing.counts - np.einsum("nmk,mk->nm", closing.terms, self.coefficients)))
-
-    def leverage(self, closing: _Closing) -> Array:
-        """Standard deviation of what is foretold for counts that scatter by one, shape (n, 20)."""
-        return np.asarray(np.sqrt(np.einsum("nmk,mkl,nml->nm", closing.terms, self.spread, closing.terms)))
 
 
 def _runs(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -116,66 +116,6 @@ def test_a_link_that_lands_on_something_is_noticed_while_the_fingers_stand_still
     assert links.landed_s(pushing(landed, "WRJ1", 400.0)) == pytest.approx(0.3, abs=0.05)
 
 
-def opening(chance: np.random.Generator) -> CarrySamples:
-    """Fingers that open freely; closings tell less of how they do."""
-    closed = closing(chance)
-    counts = 12.0 * chance.standard_normal((COUNT, 20))
-    return replace(closed, joints_rad=closed.joints_rad[::-1].copy(), motor_counts=counts)
-
-
-def test_a_link_that_pushes_while_the_hand_opens_is_noticed_where_free_motors_are_known() -> None:
-    chance = np.random.default_rng(13)
-    links, pushed = watched(chance), pushing(opening(chance), "RFJ3", 200.0)
-    assert links.opened_s(opening(chance)) == 0.0
-    assert links.opened_s(pushed) == pytest.approx(0.5, abs=0.06)
-    assert LinkPushes(MOTORS, TIPS, "right").opened_s(pushed) == 0.0
-    assert links.opened_s(replace(pushed, motor_counts=None)) == 0.0
-
-
-def test_a_motor_that_stood_still_in_closings_tells_nothing_of_the_opening() -> None:
-    chance = np.random.default_rng(14)
-    links = LinkPushes(MOTORS, TIPS, "right")
-    for _ in range(2):
-        standing = closing(chance)
-        standing.joints_rad[:, JOINT_INDEX["RFJ3"]] = 0.3
-        links.pushed_s(standing)
-    assert links.opened_s(pushing(opening(chance), "RFJ3", 200.0)) == 0.0
-    assert links.opened_s(pushing(opening(chance), "FFJ3", 200.0)) == pytest.approx(0.5, abs=0.06)
-
-
-def test_the_place_is_less_certain_after_a_link_pushed_while_the_hand_opened() -> None:
-    chance, before = np.random.default_rng(15), StepSigma(0.0003, 0.005)
-    closed, opened = closing(chance), opening(chance)
-    free, pushed = (
-        after_opening(closed, samples) for samples in (opened, pushing(opened, "RFJ3", 200.0, slice(20, 60)))
-    )
-    assert free.then_closed(before) == before
-    told = pushed.then_closed(before)
-    assert told is not None
-    assert told.translation_m == pytest.approx(np.hypot(0.0003, pushed.odometry.noise.opened_m))
-    late = after_opening(closed, pushing(opened, "RFJ3", 200.0, slice(150, 190)))
-    assert late.then_closed(before) == before
-
-
-def after_opening(closed: CarrySamples, opened: CarrySamples) -> HeldObject:
-    """An object that was grasped, held, let go, and not touched since; only the first 1.2 s of the opening count."""
-    held, after_ns = HeldObject(TIPS, "right", motors=MOTORS), int(1e9 * STEP_s * COUNT)
-    held.on_close(0)
-    feed(held, closed, 0)
-    held.on_capture(after_ns)
-    held.end_hold()
-    held.on_open(after_ns)
-    feed(held, opened, after_ns)
-    held.on_tare(2 * after_ns)
-    return held
-
-
-def feed(held: HeldObject, samples: CarrySamples, from_ns: int) -> None:
-    assert samples.motor_counts is not None
-    for row, stamp_ns in enumerate(samples.stamps_ns):
-        held.on_hand(from_ns + int(stamp_ns), samples.joints_rad[row], np.eye(4), samples.motor_counts[row])
-
-
 def test_fingers_that_open_on_the_way_down_land_on_nothing() -> None:
     assert LinkPushes(MOTORS, TIPS, "right").landed_s(closing(np.random.default_rng(12))) == 0.0
 

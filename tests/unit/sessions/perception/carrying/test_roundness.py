@@ -56,7 +56,8 @@ def test_sides_that_lean_may_roll() -> None:
     upright, leaning = (turned(DISC, lean=lean) for lean in (0.0, 0.1))
     assert roundness(leaning).lean == pytest.approx(0.1, abs=0.01)
     odometry = CarryOdometry({}, "right")
-    assert odometry.carry(leaning).sigma.translation_m > odometry.carry(upright).sigma.translation_m + 0.0001
+    rolled_m2 = odometry.carry(leaning).sigma.translation_m ** 2 - odometry.carry(upright).sigma.translation_m ** 2
+    assert np.sqrt(rolled_m2) == pytest.approx(0.1 * odometry.noise.roll_m, rel=0.1)
 
 
 def test_an_object_that_nobody_holds_is_not_called_round() -> None:
