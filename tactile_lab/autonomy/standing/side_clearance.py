@@ -99,7 +99,7 @@ class StandingBox:
         """How far world places x, y (..., 2) lie beyond its sides along its own two axes, same shape."""
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         x, y = np.moveaxis(places_m - self.centre_m, -1, 0)
-        return np.abs(np.stack([c * x + s * y, -s * x + c * y], axis=-1)) - np.array(self.size_m[:2]) / 2
+        return np.asarray(np.abs(np.stack([c * x + s * y, -s * x + c * y], axis=-1)) - np.array(self.size_m[:2]) / 2)
 
 
 @dataclass(frozen=True)
