@@ -50,8 +50,12 @@ class Guard:
 
     def leans(self) -> bool:
         """Look at the last cycle after the motion, while fingertips are laid on; whether a link leans on something."""
+        return self.leans_hard() or self._links.is_leaning
+
+    def leans_hard(self) -> bool:
+        """The same, where fingertips may press as well: only what is more than they feel."""
         self._links.take(self._motion.motor_torques, self._motion.hand_stamp_ns)
-        return self._links.is_leaning
+        return self._links.is_leaning_hard
 
     def _pushes_unfelt(self) -> bool:
         """Whether a motor whose joint stands still works against something that no tip, or not its finger's, feels."""

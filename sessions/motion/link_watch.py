@@ -87,10 +87,15 @@ class LinkWatch:
 
     @property
     def is_leaning(self) -> bool:
-        """Whether something pushes on a link of a finger that is moved a little; or harder on the whole hand than all
-        fingertips that are laid on: then the wrist's motors alone may show it.
+        """Whether something pushes on a link of a finger that is moved a little."""
+        return self._leaning >= _MOVING[1]
+
+    @property
+    def is_leaning_hard(self) -> bool:
+        """Whether something pushes harder on the hand than fingertips that are laid on: the wrist's motors alone may
+        show it.
         """
-        return self._leaning >= _MOVING[1] or self.is_touched or self._both >= _BOTH_MOVING
+        return self.is_touched or self._both >= _BOTH_MOVING
 
     @property
     def pushed(self) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ touch.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -104,7 +104,8 @@ class Toucher:
             motion.supervisor.on_approach()
             found, is_known = self._landing_points(_DOWN, frame), below_top_m < np.inf
             if not is_known or LINKS not in self.guard.met:
-                self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m, heeds_links=is_known)
+                leans = self.guard.leans if is_known else self.guard.leans_hard
+                self._lay_on(table, TAP, _DOWN, frame, s.force_N, s.sink_m, leans=leans)
                 found = landed if len(landed := self._landing_points(_DOWN, frame)) else found
         self.capture()
         motion.rise(self._cycle.lift_m, self._cycle.travel_m_s)
@@ -140,8 +141,8 @@ class Toucher:
 
         Args:
             places: fingers move along their frames' y axes, over the origin and a little beyond; of those after the
-                first it is known where the side is, and what the hand meets on its way there ends the touch; so does an
-                object that has given way, which leans by now.
+                first it is known where the side is, and what fingertips meet on their way there is felt and ends the
+                touch; so does an object that has given way, which leans by now.
             side: where the palm stands, one of :data:`~drivers.shadow.closing.closing.SIDES`.
             from_m: where the fingertips begin, counted from the origin.
             beyond_m: how far over the origin; as the settings say unless given.
@@ -162,9 +163,13 @@ class Toucher:
         motion.tare(self._cycle.rest_s)
         landed = latest = self._lay_against(lane)
         for following in further:
-            lane = replace(lane, place=following)
-            if self._has_given_way(latest) or not self._go_along(lane):
+            beside = replace(lane, place=following)
+            if self._has_given_way(latest):
                 break
+            if not self._go_along(beside):
+                self.capture()  # of a handle, perhaps
+                break
+            lane = beside
             latest = self._lay_against(lane)
             landed = np.vstack([landed, latest])
         motion.move_base(lane.joints(motion, from_m), *self._travel)
@@ -197,6 +202,7 @@ class Toucher:
         back[:3] -= motion.runtime.world_T_mount.rotation().unrotate(_AWAY_m * lane.ahead)
         motion.move_base(back, *self._travel)
         motion.blend_fingers(lane.table, lane.column.progress, cycle.finger_rad_s, lane.column.aside(lane.table))
+        motion.runtime.begin_closing()
         self.guard.restart()
         return motion.probe_base(over, cycle.approach_m_s, self.guard.is_met)
 
@@ -251,14 +257,13 @@ class Toucher:
         force_N: float,
         sink_m: float,
         up_to_m: float = np.inf,
-        *,
-        heeds_links: bool = True,
+        leans: Callable[[], bool] | None = None,
     ) -> None:
         """Every fingertip moves along a direction until it has the contact force, or has reached its limit.
 
         The hand sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction
         itself. While a fingertip is pressed hard, or a link leans on something, the hand draws back; once a link has
-        done so it sinks no more. Where only finding the object matters, links are not heeded.
+        done so it sinks no more. Where only finding the object matters, only links that lean hard are heeded.
         """
         s, motion = self.settings, self._motion
         rates = motor_rates(table, pattern.progress, direction_grasp, self._hand)
@@ -270,9 +275,8 @@ class Toucher:
         way = np.zeros(6)
         way[:3] = motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
         for _ in motion.shares(s.press_s + (_SUNK_s if sink_m else 0.0)):
-            leans = heeds_links and self.guard.leans()
-            has_leaned |= leans
-            if leans or max(motion.loads_N().values(), default=0.0) >= s.most_N:
+            has_leaned |= (is_leaning := (leans or self.guard.leans)())
+            if is_leaning or max(motion.loads_N().values(), default=0.0) >= s.most_N:
                 sunk_m = max(sunk_m - step_m, -sink_m)
             elif not has_leaned:
                 sunk_m = min(sunk_m + step_m, sink_m)

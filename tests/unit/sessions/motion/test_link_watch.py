@@ -185,14 +185,14 @@ def test_a_finger_that_is_laid_on_and_leans_on_a_link_is_told_in_two_readings() 
 
 
 def leans_after(pushes: list[dict[int, float]]) -> bool:
-    """Whether a link leans after further readings, with counts added by motor."""
+    """Whether a link leans hard after further readings, with counts added by motor."""
     rng, watch = np.random.default_rng(0), LinkWatch(np.isin(np.arange(20), (8, 9)))
     for cycle in range(100 + len(pushes)):
         torques = 300.0 + 3.0 * rng.standard_normal(20)
         for motor, count in pushes[cycle - 100].items() if cycle >= 100 else ():
             torques[motor] += count
         watch.take(torques, cycle * CYCLE_ns)
-    return watch.is_leaning
+    return watch.is_leaning_hard
 
 
 def test_the_wrist_tells_a_link_that_leans_while_fingers_are_laid_on_whose_own_motors_show_nothing() -> None:

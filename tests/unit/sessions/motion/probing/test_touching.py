@@ -191,6 +191,22 @@ def test_what_gave_way_when_it_was_touched_is_not_touched_at_further_places(
     assert len(laid) == touched
 
 
+def test_what_stands_in_the_way_along_a_side_is_felt_and_the_hand_goes_back_where_it_came_from(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    world = DiscWorld(disc(0.15))
+    motion, ways = motion_on(world), []
+    motion.tallest_m, toucher = 0.15, Toucher(motion, QUICK, TIP)
+    monkeypatch.setattr(toucher, "_go_along", lambda lane: False)
+    monkeypatch.setattr(motion, "move_base", lambda q, *speeds: ways.append(q))
+    places = [TouchPlace(GraspFrame(x_m, 0.05, 0.0), 0.05) for x_m in (0.0, 0.03, 0.06)]
+    toucher.touch_side(places, "left", 0.1, 0.02)
+    assert world.session_events.count(EventKind.TOUCH_END) == 2
+    table = closing("pinch-from-left", 0.05, TIP)
+    first_m, second_m = (motion.base_joints(each.frame, table, 0.0, 0.1)[0] for each in places[:2])
+    assert abs(ways[-1][0] - first_m) < abs(ways[-1][0] - second_m)
+
+
 @pytest.mark.parametrize("met", [("links",), ("FF",)])
 def test_where_a_link_stands_on_the_object_no_fingertip_is_laid_on(
     met: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
@@ -199,16 +215,16 @@ def test_where_a_link_stands_on_the_object_no_fingertip_is_laid_on(
     monkeypatch.setattr(toucher.guard, "is_met", lambda: True)
     monkeypatch.setattr(toucher.guard, "restart", lambda: None)
     monkeypatch.setattr(toucher.guard, "met", met)
-    monkeypatch.setattr(toucher, "_lay_on", lambda *_, heeds_links: laid_on.append(heeds_links))
+    monkeypatch.setattr(toucher, "_lay_on", lambda *_, leans: laid_on.append(leans))
     toucher.tap(GraspFrame(0.0, 0.0, 0.0), below_top_m=0.03)
-    assert laid_on == ([True] if met == ("FF",) else [])
+    assert laid_on == ([toucher.guard.leans] if met == ("FF",) else [])
     toucher.tap(GraspFrame(0.0, 0.0, 0.0))
-    assert laid_on[-1] is False
+    assert laid_on[-1] == toucher.guard.leans_hard
 
 
 def test_a_tap_tells_what_it_met_even_where_the_hand_has_drawn_back_since(monkeypatch: pytest.MonkeyPatch) -> None:
     toucher = Toucher(motion_on(DiscWorld(disc(0.05))), QUICK, TIP)
-    monkeypatch.setattr(toucher, "_lay_on", lambda *_, heeds_links: toucher._motion.rise(0.05, 1.0))
+    monkeypatch.setattr(toucher, "_lay_on", lambda *_, leans: toucher._motion.rise(0.05, 1.0))
     felt = toucher.tap(GraspFrame(0.0, 0.0, 0.0))
     assert len(felt) >= 1
     np.testing.assert_allclose(felt[:, 2], 0.05, atol=3e-3)
@@ -221,10 +237,9 @@ def test_a_hand_whose_link_leans_on_something_draws_back_until_it_leans_no_more_
     world = DiscWorld(None)
     motion = motion_on(world)
     toucher, leans = Toucher(motion, QUICK, TIP), iter([False] * 2 + [True] * for_cycles + [False] * 1000)
-    monkeypatch.setattr(toucher.guard, "leans", lambda: next(leans))
     start_m = float(world.base_q[2])
     table, frame = closing(TAP.closing, TAP_HEIGHT_m, TIP), GraspFrame(0.0, 0.0, 0.0)
-    toucher._lay_on(table, TAP, np.array([0.0, 0.0, -1.0]), frame, 0.35, 0.004)
+    toucher._lay_on(table, TAP, np.array([0.0, 0.0, -1.0]), frame, 0.35, 0.004, leans=lambda: next(leans))
     assert round((float(world.base_q[2]) - start_m) / 0.004) == higher
 
 
