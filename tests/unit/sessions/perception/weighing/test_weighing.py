@@ -71,7 +71,7 @@ def test_a_squeeze_that_swings_tells_what_wrong_joint_angles_add_to_the_weight()
             found = hanging(wrong, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
             found_N.append(found.weight_N - MASS_kg * GRAVITY)
     at_rest_N, swung_N = (float(np.sqrt(np.mean(np.square(found_N)))) for found_N in off_N.values())
-    assert swung_N < 0.4 * at_rest_N
+    assert swung_N < 0.6 * at_rest_N
 
 
 def test_an_edge_that_still_stands_on_the_table_is_noticed():
