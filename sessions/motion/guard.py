@@ -48,6 +48,10 @@ class Guard:
         self.met = tuple(dict.fromkeys((*self.met, *found)))
         return bool(self.met)
 
+    def keep_usual(self) -> None:
+        """The motion has ended, and fingertips are going to be laid on."""
+        self._links.keep_usual()
+
     def leans(self) -> bool:
         """Look at the last cycle after the motion, while fingertips are laid on; whether a link leans on something."""
         return self.leans_hard() or self._links.is_leaning

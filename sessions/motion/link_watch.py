@@ -62,23 +62,31 @@ class LinkWatch:
         self._sigmas, self._counts, self._in_a_row = np.where(is_wrist, *np.array([_STILL_WRIST, _STILL])[..., None])
         self._readings, self._compared = np.empty((len(is_wrist), _COMPARED)), 0
         """The newest ones of each motor, in no order, and how many there have been."""
-        self._sigma_before = np.zeros(len(is_wrist))
-        """Of the last motion that was long enough to tell it."""
+        self._usual_before: tuple[Array, Array] | None = None
+        """Median and standard deviation in the last motion that was long enough to tell them."""
         self.restart()
 
     def restart(self) -> None:
         """A new even motion begins."""
         if self._compared >= _COMPARED:
-            self._sigma_before = self._usual()[1]
+            self._usual_before = self._usual()
         self._began_ns: int | None = None
         self._newest: tuple[int, Array] | None = None
         self._heard_ns: int | None = None
         self._since: list[Array] = []
         """What was heard since the newest reading."""
         self._compared = 0
+        self._kept: tuple[Array, Array] | None = None
         self._far, self._leaning, self._both, self._off = 0, 0, 0, np.zeros(len(self._counts), dtype=int)
         """Readings in a row in which any motor is far off, a finger's is a little, or both of the wrist are; and for
         each motor, in which it is off at all."""
+
+    def keep_usual(self) -> None:
+        """The motion has ended: what leans hard is compared with it from now on, as what leans on does not go by.
+
+        Where it was too short to tell, with the one before it.
+        """
+        self._kept = self._usual() if self._compared >= _LEAST_COMPARED else self._usual_before
 
     @property
     def is_touched(self) -> bool:
@@ -130,15 +138,15 @@ class LinkWatch:
 
     def _judge(self, torques: Array, is_new: NDArray[np.bool_]) -> None:
         usual, sigma = self._usual()
-        if self._compared < _COMPARED:  # ten readings may happen to be alike
-            sigma = np.maximum(sigma, self._sigma_before)
-        off = np.abs(torques - usual)
-        far = off > np.maximum(_LEAST_COUNTS, _SIGMAS * sigma)
+        kept, kept_sigma = self._kept or (usual, sigma)
+        off_kept = np.abs(torques - kept)
+        far = off_kept > np.maximum(_LEAST_COUNTS, _SIGMAS * kept_sigma)
         self._far = self._far + bool(is_new[far].any()) if far.any() else 0
+        both = self._is_wrist & (off_kept > _BOTH[0])
+        self._both = self._both + bool(is_new[both].any()) if np.count_nonzero(both) > 1 else 0
+        off = np.abs(torques - usual)
         leans = (off > np.maximum(_MOVING[0], _SIGMAS * sigma)) & ~self._is_wrist
         self._leaning = self._leaning + bool(is_new[leans].any()) if leans.any() else 0
-        both = self._is_wrist & (off > _BOTH[0])
-        self._both = self._both + bool(is_new[both].any()) if np.count_nonzero(both) > 1 else 0
         is_off = off > np.maximum(self._counts, self._sigmas * sigma)
         self._off = np.where(is_off, self._off + is_new, 0)
 
@@ -146,7 +154,10 @@ class LinkWatch:
         """Median of each motor's readings, and their standard deviation by the median one; shape (20,) each."""
         known = self._readings[:, : self._compared]
         usual = _medians(known)
-        return usual, _MAD_TO_SIGMA * _medians(np.abs(known - usual[:, None]))
+        sigma = _MAD_TO_SIGMA * _medians(np.abs(known - usual[:, None]))
+        if self._compared < _COMPARED and self._usual_before is not None:  # ten readings may happen to be alike
+            sigma = np.maximum(sigma, self._usual_before[1])
+        return usual, sigma
 
 
 def _medians(rows: Array) -> Array:

@@ -270,6 +270,7 @@ class Toucher:
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         force_N = force_N if len(rates) > 1 else max(force_N, s.alone_N)
         gone_m = dict.fromkeys(rates, 0.0)
+        self.guard.keep_usual()
         start, sunk_m, has_leaned = motion.runtime.perception.hand.base_q.copy(), 0.0, False
         step_m = sink_m / motion.cycles(s.press_s)
         way = np.zeros(6)

@@ -195,6 +195,20 @@ def leans_after(pushes: list[dict[int, float]]) -> bool:
     return watch.is_leaning_hard
 
 
+def test_a_push_that_grows_and_stays_is_compared_with_the_motion_before_it() -> None:
+    growing = [{8: 60.0 * number} for number in range(1, 7)]
+    rng, watches = np.random.default_rng(0), [LinkWatch(WRIST), LinkWatch(WRIST)]
+    for cycle in range(40 + len(growing)):
+        torques = 300.0 + 25.0 * rng.standard_normal(20)
+        for motor, count in growing[cycle - 40].items() if cycle >= 40 else ():
+            torques[motor] += count
+        if cycle == 40:
+            watches[0].keep_usual()
+        for watch in watches:
+            watch.take(torques, cycle * CYCLE_ns)
+    assert [watch.is_leaning_hard for watch in watches] == [True, False]
+
+
 def test_the_wrist_tells_a_link_that_leans_while_fingers_are_laid_on_whose_own_motors_show_nothing() -> None:
     assert leans_after([{8: 100.0, 9: -100.0}] * 3)
     assert leans_after([{8: 400.0}] * 2)
