@@ -13,11 +13,11 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.motion.arrival import Arrival, Place
 from sessions.motion.carry_guard import CarryGuard, cycles_evenly_along
 from sessions.motion.cycle_settings import CycleSettings
-from sessions.motion.grasp_fingers import GraspFingers
+from sessions.motion.grasp_fingers import CLEAR_m, GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, TouchPlace, evade
 from sessions.motion.holding import HoldingForces
-from sessions.motion.lift import Lift
+from sessions.motion.lift import Lift, LiftEnd
 from sessions.motion.motion import Motion
 from sessions.motion.probing.touching import SideTouch, Toucher
 from sessions.motion.travel import travel_height_m
@@ -285,6 +285,8 @@ class GraspCycle:
             is_pressed=lambda: bool(self.fingers.pressed(self.settings.pressed_N)),
         )
         lift = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
+        if lift.end is LiftEnd.ABOVE:
+            self._motion.rise(CLEAR_m, self.settings.travel_m_s)
         if lift.end.is_held:
             self.fingers.ease(touching, self.settings.weighing.squeeze_N)
         self._motion.runtime.end_hold()

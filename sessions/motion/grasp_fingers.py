@@ -13,6 +13,9 @@ from sessions.motion.motion import Motion
 _HASTE_N, _FLIGHT_N = 1.0, 3.0
 """Limits of the force error in force control: toward the object, and away from it."""
 
+CLEAR_m = 0.02
+"""So far the hand rises where a fingertip is over an object that it has lost."""
+
 
 class GraspFingers:
     """Moves the fingers along the paths of a closing, by position and by force.
@@ -158,8 +161,10 @@ class GraspFingers:
     def release(self) -> None:
         """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Overloaded fingers are released first, the others wait for them, unless they are in their way.
+        Overloaded fingers are released first, the others wait for them, unless they are in their way. A finger that felt
+        nothing before and is pressed as it opens is over the object that it has lost: the hand rises once.
         """
+        lost = set(self._fingers) - set(self.pressed(self.settings.touch_force_N))
         table, closed, opened = self.table, self.progress, _open(self.table)
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
         shares = dict.fromkeys(self._fingers, 0.0)
@@ -168,6 +173,9 @@ class GraspFingers:
             return closed[finger] + min(1.0, share) * (opened[finger] - closed[finger])
 
         while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
+            if lost & set(self.pressed(self.settings.closing_most_N)):
+                self._motion.rise(CLEAR_m, self.settings.travel_m_s)
+                lost = set()
             urgent = closed_still & self._overloaded_fingers()
             free = {finger for finger in closed_still if not self._nears(finger, place(finger, shares[finger] + step))}
             for finger in urgent & free or free or closed_still:

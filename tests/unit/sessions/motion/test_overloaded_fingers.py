@@ -190,6 +190,23 @@ def test_a_finger_that_stays_strained_does_not_keep_the_hand_closed(strain: Stra
     assert ways(strain.cycle) == pytest.approx(opened)
 
 
+@pytest.mark.parametrize(("felt_before_N", "risen_m"), [(-5.0, 0.02), (0.0, 0.0)])
+def test_a_hand_that_opens_rises_where_a_finger_that_had_lost_the_object_comes_upon_it(
+    strain: Strain, felt_before_N: float, risen_m: float
+) -> None:
+    strain.grasp()
+    strain.extra_N, cycles = {"TH": felt_before_N}, list[float]()
+
+    def watch(world: DiscWorld) -> None:
+        cycles.append(float(world.base_q[2]))
+        strain.extra_N = {"TH": 5.0} if 3 <= len(cycles) < 6 else {}
+
+    before_m = float(strain.world.base_q[2])
+    strain.world.before_cycle = watch
+    strain.cycle.release()
+    assert abs(float(strain.world.base_q[2]) - before_m) == pytest.approx(risen_m, abs=1e-3)
+
+
 def test_a_strained_finger_opens_no_farther_than_its_neighbour_leaves_room(strain: Strain) -> None:
     """The middle finger, opened alone from a radial grasp, came to where the first finger was: its sensor saturated."""
     cycle, gaps_m = strain.cycle, list[float]()
