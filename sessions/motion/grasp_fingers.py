@@ -161,8 +161,8 @@ class GraspFingers:
     def release(self) -> None:
         """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Overloaded fingers are released first, the others wait for them, unless they are in their way. A finger that felt
-        nothing before and is pressed as it opens is over the object that it has lost: the hand rises once.
+        Overloaded fingers are released first, the others wait for them, unless they are in their way. A finger that
+        felt nothing before and is pressed as it opens is over the object that it has lost: the hand rises once.
         """
         lost = set(self._fingers) - set(self.pressed(self.settings.touch_force_N))
         table, closed, opened = self.table, self.progress, _open(self.table)
