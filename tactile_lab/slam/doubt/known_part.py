@@ -93,21 +93,19 @@ def known_part(
         reach_m: how far from a contact an outline is known; a surface no further than :data:`SURFACE_REACH_m`.
     """
     sides = _outline(shape) if isinstance(shape, Contour) else _surface(shape)
-    points, normals = sides.points_m, sides.normals
-    distances, unfelt = _nearest_alike(sides, contacts), np.zeros(len(points), dtype=bool)
-    if isinstance(shape, SurfaceMesh):
-        near = (distances < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
+    distances_m, nowhere = _nearest_alike(sides, contacts), np.zeros(len(sides.points_m), dtype=bool)
+    unfelt = foot = nowhere
+    if isinstance(shape, Contour):
+        near = distances_m < reach_m
     else:
-        near = distances < reach_m
-    if isinstance(shape, SurfaceMesh) and floor_m is not None:
-        unfelt = unfelt_top(shape, contacts.points_m, contacts.normals, near)
-        near, distances = near & ~unfelt, np.where(unfelt, REACH_m, distances)
-    known = near & (shape.sigma_m <= LARGEST_SIGMA_m)
-    if isinstance(shape, SurfaceMesh) and floor_m is not None:
-        foot = (points[:, 2] < floor_m + LEVEL_SIGMA_m) & (normals[:, 2] < _DOWN)
-        known, near = known | foot, near | foot
+        near = (distances_m < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
+        if floor_m is not None:
+            unfelt = unfelt_top(shape, contacts.points_m, contacts.normals, near)
+            foot = (sides.points_m[:, 2] < floor_m + LEVEL_SIGMA_m) & (sides.normals[:, 2] < _DOWN)
+    near, distances_m = near & ~unfelt, np.where(unfelt, REACH_m, distances_m)
+    known, near = (near & (shape.sigma_m <= LARGEST_SIGMA_m)) | foot, near | foot
     share = float(sides.sizes @ known / max(float(sides.sizes.sum()), 1e-12))
-    return KnownPart(near, known, min(share, 1.0), distances, unfelt)
+    return KnownPart(near, known, min(share, 1.0), distances_m, unfelt)
 
 
 def with_guesses_told(shape: _Shape, part: KnownPart) -> _Shape:
