@@ -23,7 +23,7 @@ from tactile_lab.autonomy.standing.side_clearance import StandingBox
 from tactile_lab.autonomy.standing.side_planner import slides_up_to_m
 from tactile_lab.autonomy.standing.storeys import Storeys
 
-_TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.04, 0.025, 0.025
+_TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.015, 0.025, 0.025
 _INSIDE_m = 0.008
 """From the edges of a face to the places where it is touched."""
 
