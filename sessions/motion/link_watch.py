@@ -34,12 +34,12 @@ _STILL_WRIST = (4.0, 60.0, 5)
 _BOTH = (60.0, 2)
 """The same for the wrist's two motors together: jerks show in one of them, 51 counts at most in both."""
 
-_BOTH_MOVING = 3
-"""Readings in a row for the wrist while fingertips are laid on: up to two show what they feel."""
-
 _MOVING = (60.0, 2)
 """The same for the motor of a finger that moves a little, as when it is laid on something: what its tip feels is 0.7 N
 there, and shows as 45 counts at most; 1 N on a link shows as 90."""
+
+_BOTH_MOVING = 3
+"""Readings in a row for the wrist while fingertips are laid on: up to two show what they feel."""
 
 _COMPARED, _LEAST_COMPARED = 200, 5
 """Newest readings that tell what is usual, and the fewest."""

@@ -270,13 +270,14 @@ class Toucher:
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         force_N = force_N if len(rates) > 1 else max(force_N, s.alone_N)
         gone_m = dict.fromkeys(rates, 0.0)
+        leans = leans or self.guard.leans
         self.guard.keep_usual()
         start, sunk_m, has_leaned = motion.runtime.perception.hand.base_q.copy(), 0.0, False
         step_m = sink_m / motion.cycles(s.press_s)
         way = np.zeros(6)
         way[:3] = motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
         for _ in motion.shares(s.press_s + (_SUNK_s if sink_m else 0.0)):
-            has_leaned |= (is_leaning := (leans or self.guard.leans)())
+            has_leaned |= (is_leaning := leans())
             if is_leaning or max(motion.loads_N().values(), default=0.0) >= s.most_N:
                 sunk_m = max(sunk_m - step_m, -sink_m)
             elif not has_leaned:

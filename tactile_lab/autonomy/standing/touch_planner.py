@@ -7,7 +7,7 @@ would rather slide than tip.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -92,24 +92,28 @@ class TouchPlanner(ActionPlanner):
         """Side by side over the top, turned so that no finger comes down on an edge."""
         box, is_round, (low, high) = self.felt.storeys.boxes[-1], self.felt.is_round, self.yaw_window_rad
         yaws_rad = [yaw for yaw in (low + high) / 2 + _TAP_TURNS_rad if low <= yaw <= high]
+        table = closing(TAP.closing, TAP_HEIGHT_m, self.hand)
+        tips_m = {finger: table.path(finger).centre_m(TAP.progress[finger]) for finger in table.fingers}
         for along_m in _places(box.size_m[0] / 2, _TAPS_APART_m):
             for across_m in _places(box.size_m[1] / 2, _TAPS_APART_m):
                 for yaw_rad in yaws_rad:
                     frame = GraspFrame(*_at(box, along_m, across_m), float(yaw_rad))
-                    if touches := self._tapped(frame, box, is_round):
+                    if touches := self._tapped(frame, tips_m, box, is_round):
                         yield self._candidate(frame, TAP.closing, TAP_HEIGHT_m, touches, "tap on the top")
 
-    def _tapped(self, frame: GraspFrame, box: StandingBox, is_round: bool) -> dict[str, Array]:
-        """Where fingertips meet the top, by finger; nothing where one would come down on an edge, and lean a link."""
-        table = closing(TAP.closing, TAP_HEIGHT_m, self.hand)
-        centres_m = [table.path(finger).centre_m(TAP.progress[finger]) for finger in table.fingers]
-        places_m = np.array([frame.pose.transformFrom(centre_m) for centre_m in centres_m])
+    def _tapped(
+        self, frame: GraspFrame, tips_m: Mapping[str, Array], box: StandingBox, is_round: bool
+    ) -> dict[str, Array]:
+        """Where fingertips, in the grasp frame, meet the top; nothing where one would come down on an edge, and lean a
+        link.
+        """
+        places_m = np.array([frame.pose.transformFrom(tip_m) for tip_m in tips_m.values()])
         places_m[:, 2] = box.size_m[2]
         outside_m = box.outside_m(places_m[:, :2], is_round)
         meets = outside_m < -_INSIDE_m / 2
         if (outside_m[~meets] < self.hand.radius_m + _BESIDE_m).any():
             return {}
-        met = zip(table.fingers, places_m, meets, strict=True)
+        met = zip(tips_m, places_m, meets, strict=True)
         return {finger: place for finger, place, is_met in met if is_met and not self.felt.is_open(place)}
 
     # --- from the side -------------------------------------------------------------------------------------------
