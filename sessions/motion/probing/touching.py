@@ -167,7 +167,7 @@ class Toucher:
             if self._has_given_way(latest):
                 break
             if not self._go_along(beside):
-                self.capture()  # of a handle, perhaps
+                self._meet_again(beside)
                 break
             lane = beside
             latest = self._lay_against(lane)
@@ -205,6 +205,17 @@ class Toucher:
         motion.runtime.begin_closing()
         self.guard.restart()
         return motion.probe_base(over, cycle.approach_m_s, self.guard.is_met)
+
+    def _meet_again(self, lane: Lane) -> None:
+        """What was met on the way to another lane, of a handle perhaps, is felt: the hand has turned back from it."""
+        s, motion, over = self.settings, self._motion, lane.joints(self._motion, _AWAY_m)
+        motion.runtime.begin_closing()
+        way = over[:3] - motion.runtime.perception.hand.base_q[:3]
+        along = motion.runtime.world_T_mount.rotation().rotate(way / np.linalg.norm(way))
+        if self._approach(over, s.side_m_s):
+            direction = np.asarray(lane.frame.pose.rotation().unrotate(along))
+            self._lay_on(lane.table, lane.column, direction, lane.frame, s.alone_N, s.sink_m)
+            self.capture()
 
     def _rise_over(self, frame: GraspFrame, table: Closing, away_m: float) -> None:
         """Up to where the hand may travel."""

@@ -139,9 +139,11 @@ class FeltObject:
         self._points_m, self._normals, self._moved = [], [], self._first.move(motion)
         self.add(points_m, normals)
 
-    def on_looked(self, places_m: Sequence[Array]) -> None:
-        """Something was looked for at these places, (3,) each, world: they are no longer new."""
-        self._looked_m += places_m
+    def on_looked(self, places_m: Array) -> None:
+        """Contacts were expected at these places, (n, 3), world: found there, elsewhere or nowhere, they are no longer
+        new.
+        """
+        self._looked_m += list(places_m)
 
     def on_pushed(self, way: Array) -> None:
         """It was touched from one side alone along a horizontal unit vector, world, shape (2,)."""
@@ -197,7 +199,7 @@ class FeltObject:
         return [float(np.clip(yaw, low, high)) for yaw in yaws if low - askew_rad <= yaw <= high + askew_rad]
 
     def distances_m(self, places_m: Array) -> Array:
-        """Of places (n, 3) to the nearest where a contact was, or was looked for in vain, shape (n,), at most 40 mm."""
+        """Of places (n, 3) to the nearest where a contact was, or was expected before, shape (n,), at most 40 mm."""
         return np.minimum(self._apart_m(places_m, [*self._points_m, *self._looked_m]), _FAR_m)
 
     @staticmethod

@@ -100,10 +100,8 @@ class StandingPlanner:
         if (done := self._current) is None:
             return
         self._touches += done.plan.only_touch
-        touched = frozenset() if done.plan.only_touch else grasp.touching
         self.whereabouts.on_grasp(grasp, done, approach_of(done.plan, self.hand))
-        looked = [place for finger, place in done.touches.items() if finger not in touched]
-        self.felt.on_looked([*looked, *done.further_m])
+        self.felt.on_looked(done.touches_m)
         if done.plan.only_touch and done.plan.places:
             self.felt.on_pushed(approach_of(done.plan, self.hand))
         if done.plan.only_touch and done.plan.closing == TAP.closing:
