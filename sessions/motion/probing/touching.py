@@ -184,6 +184,7 @@ class Toucher:
         motion, along = self._motion, np.array(lane.table.approach)
         motion.runtime.begin_closing()
         if not self._approach(lane.joints(motion, -lane.past_m), self.settings.side_m_s):
+            self.capture()  # only that there is nothing
             return np.empty((0, 3))
         landed = self._landing_points(along, lane.frame)
         self._lay_on(lane.table, lane.column, along, lane.frame, self.settings.rake_N, 0.0, lane.place.up_to_m)

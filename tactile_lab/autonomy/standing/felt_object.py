@@ -9,7 +9,7 @@ import numpy as np
 from gtsam import Pose2
 from numpy.typing import NDArray
 
-from drivers.core.contacts import Array, Grasp
+from drivers.core.contacts import ApproachPath, Array, Grasp
 from sessions.conductor.object_gone import OPENING_m
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
@@ -61,6 +61,7 @@ class FeltObject:
     _normals: list[Array] = field(default_factory=list)
     _looked_m: list[Array] = field(default_factory=list)
     _open_m: list[Array] = field(default_factory=list)
+    _passed_m: list[Array] = field(default_factory=list)
     _pushed: Array | None = None
     _first: BoundingBox = field(init=False)
     _moved: BoundingBox = field(init=False)
@@ -154,6 +155,10 @@ class FeltObject:
         """Fingertips of a tap were expected at these places, (n, 3), world: those far from all contacts met nothing."""
         self._open_m += list(places_m[self._apart_m(places_m, self._points_m) > _OPEN_m[0]])
 
+    def on_passed(self, paths: Sequence[ApproachPath]) -> None:
+        """Fingertips that came to touch a side have gone these ways."""
+        self._passed_m += [path.end_world_m for path in paths if not path.touched]
+
     # --- what is known -----------------------------------------------------------------------------------------
 
     @property
@@ -212,6 +217,15 @@ class FeltObject:
         """Whether a tap has met nothing near a place of the top, shape (3,), and nearer than any contact is."""
         missed_m, met_m = (float(self._apart_m(place_m[None], some)[0]) for some in (self._open_m, self._points_m))
         return missed_m < min(_OPEN_m[1], met_m)
+
+    def passed_m(self, place_m: Array, way: Array) -> float:
+        """How far beyond a place of a side, shape (3,), fingertips went along a horizontal unit vector, shape (2,), at
+        its height, and met nothing; 0 where none did.
+        """
+        beyond_m = np.array(self._passed_m).reshape(-1, 3) - place_m
+        along_m = beyond_m[:, :2] @ way
+        aside_m = np.linalg.norm(beyond_m - along_m[:, None] * [*way, 0.0], axis=1)
+        return float(along_m[aside_m < _NEAR_m].max(initial=0.0))
 
     def is_slender(self, way: Array) -> bool:
         """Whether it is so tall against its foot along a horizontal unit vector, shape (2,), that little leans it."""

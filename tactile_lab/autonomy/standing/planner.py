@@ -104,6 +104,7 @@ class StandingPlanner:
         self.felt.on_looked(done.touches_m)
         if done.plan.only_touch and done.plan.places:
             self.felt.on_pushed(approach_of(done.plan, self.hand))
+            self.felt.on_passed(grasp.approach_paths)
         if done.plan.only_touch and done.plan.closing == TAP.closing:
             self.felt.on_missed_top(done.touches_m)
 

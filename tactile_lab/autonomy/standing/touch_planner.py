@@ -142,11 +142,18 @@ class TouchPlanner(ActionPlanner):
             slides, met = height_m < min(up_to_m, low_m), storeys.at(height_m)
             for lane_m in _lanes_m(met, across, share):
                 is_beyond = met.foot_along_m(across) - abs(lane_m) > _CLOSINGS_REACH_m
-                if slides or (is_beyond and self._hardly_leans(height_m, foot_m)):
-                    lane = met.centre_m + lane_m * across
-                    front = lane - met.way_out_m(lane, -way) * way
+                front = self._front_m(met, met.centre_m + lane_m * across, way, height_m)
+                if front is not None and (slides or (is_beyond and self._hardly_leans(height_m, foot_m))):
                     place = TouchPlace(GraspFrame(float(front[0]), float(front[1]), yaw_rad), height_m, laid_m)
                     yield self._at(place, name)
+
+    def _front_m(self, met: StandingBox, lane: Array, way: Array, height_m: float) -> Array | None:
+        """Where a side is expected in a lane, world x, y: behind where fingertips passed, beside a handle perhaps. None
+        where they passed the middle.
+        """
+        out_m = met.way_out_m(lane, -way)
+        passed_m = self.felt.passed_m(np.array([*(lane - out_m * way), height_m]), way)
+        return None if passed_m > out_m else lane - (out_m - passed_m) * way
 
     def _at(self, place: TouchPlace, name: str) -> StandingCandidate:
         """A touch at a place on a side by a closing of that name."""
