@@ -91,6 +91,30 @@ class Grip:
     is_pressed: Callable[[], bool]
 
 
+class _Lowered:
+    """Fingertips of an object that is set down: which of them have lost it.
+
+    Args:
+        held_by: the fingertips that held it before it was lifted.
+        holding: those that feel something now.
+        patience: cycles in a row without a touch before a fingertip has lost the object.
+    """
+
+    def __init__(self, held_by: frozenset[str], holding: Callable[[], frozenset[str]], patience: int) -> None:
+        self._holding, self._patience, self._lost = holding, patience, held_by - holding()
+        self._untouched = dict.fromkeys(held_by, 0)
+
+    def on_cycle(self) -> None:
+        """Count the cycles in which each feels nothing."""
+        holding = self._holding()
+        self._untouched = {tip: 0 if tip in holding else count + 1 for tip, count in self._untouched.items()}
+        self._lost |= {tip for tip, count in self._untouched.items() if count > self._patience}
+
+    def is_above(self) -> bool:
+        """Whether one that lost it feels something again."""
+        return bool(self._lost & self._holding())
+
+
 class Weigher:
     """Drags, lifts and sets down.
 
@@ -103,9 +127,9 @@ class Weigher:
     def __init__(self, motion: Motion, settings: WeighingSettings, grip: Grip) -> None:
         self._motion, self._settings, self._grip = motion, settings, grip
         self._squeeze_N = settings.squeeze_N
-        self._is_up, self._lowers, self._carried_N = False, False, 0.0
-        self._lost: frozenset[str] = frozenset()
-        """Fingertips that no longer feel the object when it begins to be set down."""
+        self._is_up, self._carried_N = False, 0.0
+        self._lowered: _Lowered | None = None
+        """The fingertips, while the object is set down."""
 
     def weigh(self, frame: GraspFrame, table: Closing) -> Lift:
         """Drag and lift the object held at a grasp frame, and set it down where it was.
@@ -134,8 +158,8 @@ class Weigher:
             if end is LiftEnd.HUNG:
                 end = self._hang(raised, height_m)
                 self._is_up = False
-            self._lost = held_by - self._grip.holding()
-            if end is not LiftEnd.LOST and not self._set_down(raised, share * height_m, hung=end is LiftEnd.HUNG):
+            lowered = _Lowered(held_by, self._grip.holding, s.patience)
+            if end is not LiftEnd.LOST and not self._set_down(raised, share * height_m, lowered, end is LiftEnd.HUNG):
                 end = LiftEnd.ABOVE
             firm_N = self._grip.share_pressed(s.firm_share)
             if end is not LiftEnd.HELD or firm_N < FIRMER * s.squeeze_N:
@@ -175,12 +199,12 @@ class Weigher:
         self._squeeze_N = usual_N
         return end
 
-    def _set_down(self, raised: Callable[..., Array], height_m: float, *, hung: bool) -> bool:
+    def _set_down(self, raised: Callable[..., Array], height_m: float, lowered: _Lowered, hung: bool) -> bool:
         """Down again. Where a fingertip is pressed, the hand goes a little back: an edge has come to stand, and the
         fingers slide on loosely; or one has slid up and comes down on the object: then it is pressed again.
 
-        A fingertip that has lost the object closes no further meanwhile, and counts as pressed as soon as it feels
-        something: it is above the object.
+        A fingertip that has lost the object, before or meanwhile, closes no further, and counts as pressed as soon as
+        it feels something: it is above the object.
 
         An object that hung free has crept down in the fingers, and stands before the hand is down: then they slide
         along it. One on an edge is held until the hand is down: its weight is not all in the fingers anyway, and let go
@@ -197,10 +221,10 @@ class Weigher:
             if held_N() < stands_N:
                 self._squeeze_N = s.landed_N
 
-        self._lowers, left_m = True, height_m
+        self._lowered, left_m = lowered, height_m
         for _ in range(_TRIES):
             if not (left_m := self._lower(raised, left_m, slide)):
-                self._lowers, self._lost, self._squeeze_N = False, frozenset(), s.squeeze_N
+                self._lowered, self._squeeze_N = None, s.squeeze_N
                 self._rest(s.rest_s)
                 return True
             self._squeeze_N = s.landed_N
@@ -261,7 +285,7 @@ class Weigher:
         return share, ended
 
     def _objection(self) -> LiftEnd | None:
-        if self._grip.is_pressed() or (self._lowers and self._lost & self._grip.holding()):
+        if self._grip.is_pressed() or (self._lowered and self._lowered.is_above()):
             return LiftEnd.PRESSED
         held_N = self._motion.runtime.perception.held_N()
         self._carried_N = max(self._carried_N, held_N)
@@ -270,7 +294,9 @@ class Weigher:
         return LiftEnd.HEAVY if held_N > self._settings.most_N else None
 
     def _keep(self) -> bool:
-        self._grip.hold(self._squeeze_N, self._lowers)
+        if self._lowered:
+            self._lowered.on_cycle()
+        self._grip.hold(self._squeeze_N, self._lowered is not None)
         return True
 
     def _rest(self, duration_s: float) -> None:
