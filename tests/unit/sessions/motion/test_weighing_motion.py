@@ -210,3 +210,17 @@ def test_only_what_hung_free_is_let_slide_through_the_fingers_once_it_stands(han
     motion.runtime.perception.held_N = lambda: 1.0 if is_down() else 3.0
     weigh(motion, hold=lambda force_N, _: forces_N.append(force_N))
     assert (WeighingSettings().landed_N in forces_N) is loosens
+
+
+@pytest.mark.parametrize(("cycles", "end"), [(3, LiftEnd.HUNG), (10, LiftEnd.ABOVE)])
+def test_a_fingertip_that_loses_the_object_for_a_while_as_it_is_set_down_is_above_it_as_soon_as_it_feels_again(
+    cycles, end
+):
+    motion, since = RecordingMotion(), []
+
+    def holding():
+        is_lowered = motion.told[-1:] == ["end_hanging"] and motion.heights_m[-1] < 0.010
+        since.extend([None] if is_lowered else [])
+        return ALL - {"TH"} if is_lowered and len(since) < 3 * cycles else ALL
+
+    assert weigh(motion, holding=holding) is end

@@ -198,10 +198,15 @@ def test_what_stands_in_the_way_along_a_side_is_felt_and_the_hand_goes_back_wher
     motion, ways = motion_on(world), []
     motion.tallest_m, toucher = 0.15, Toucher(motion, QUICK, TIP)
     monkeypatch.setattr(toucher, "_go_along", lambda lane: False)
-    monkeypatch.setattr(motion, "move_base", lambda q, *speeds: ways.append(q))
-    places = [TouchPlace(GraspFrame(x_m, 0.05, 0.0), 0.05) for x_m in (0.0, 0.03, 0.06)]
-    toucher.touch_side(places, "left", 0.1, 0.02)
+    move_base = motion.move_base
+    monkeypatch.setattr(motion, "move_base", lambda q, *speeds: (ways.append(q), move_base(q, *speeds)))
+    places = [TouchPlace(GraspFrame(x_m, -0.03, 0.0), 0.05) for x_m in (-0.09, 0.03, 0.06)]
+    touch = toucher.touch_side(places, "left", 0.1, 0.02)
     assert world.session_events.count(EventKind.TOUCH_END) == 2
+    assert touch is not None
+    on_way = [contact for contact in motion.runtime.perception.probed if contact.normal_world[0] < -0.7]
+    assert on_way
+    assert min(contact.force_N for contact in on_way) > 0.15
     table = closing("pinch-from-left", 0.05, TIP)
     first_m, second_m = (motion.base_joints(each.frame, table, 0.0, 0.1)[0] for each in places[:2])
     assert abs(ways[-1][0] - first_m) < abs(ways[-1][0] - second_m)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gtsam import Pose2, Pose3
 
-from drivers.core.contacts import Contact, Grasp
+from drivers.core.contacts import ApproachPath, Contact, Grasp
 from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.model.hand_form import HandForm
@@ -47,7 +47,7 @@ def carry_out(touches: TouchPlanner, most: int = 80) -> list[StandingCandidate]:
     """All touches until there is none, each of which meets what it expects."""
     done = []
     while (best := touches.best()) is not None and len(done) < most:
-        touches.felt.on_looked(list(best.touches_m))
+        touches.felt.on_looked(best.touches_m)
         done.append(best)
     return done
 
@@ -176,6 +176,36 @@ def test_what_closings_reach_from_both_ends_is_not_touched_high_up_however_askew
     broad = [one for one in sides(known) if known.is_slender(approach_of(one.plan, TIP))]
     assert any(one.plan.frame.yaw_rad == WINDOW_rad[1] for one in broad), "no hand comes askew"
     assert {place.height_m for one in broad for place in one.plan.places} <= {0.020, 0.032}
+
+
+def passed(ends_m: np.ndarray, touched: bool = False) -> list[ApproachPath]:
+    return [ApproachPath("FF", end_m, end_m, touched) for end_m in ends_m]
+
+
+def test_a_side_is_expected_behind_where_fingertips_passed_and_nowhere_once_they_passed_the_middle() -> None:
+    known, way = felt(0.12, 0.12, 0.06), np.array([np.cos(0.2), np.sin(0.2)])
+    front_m = np.array([*(known.middle_m - 0.06 * way), 0.02])
+    assert known.passed_m(front_m, way) == 0.0
+    known.on_passed(passed(front_m + [[*(0.012 * way), 0.003]]))
+    known.on_passed(passed(front_m + [[*(0.030 * way), 0.0]], touched=True))
+    known.on_passed(passed(front_m + [[*(0.030 * way), 0.02]]))
+    assert known.passed_m(front_m, way) == pytest.approx(0.012)
+    assert known.passed_m(front_m, -way) == 0.0
+    box, touches = known.standing_box, planner(known)
+    np.testing.assert_allclose(touches._front_m(box, known.middle_m, way, 0.02), (front_m[:2] + 0.012 * way))
+    known.on_passed(passed(front_m + [[*(0.061 * way), 0.0]]))
+    assert touches._front_m(box, known.middle_m, way, 0.02) is None
+
+
+def test_where_contacts_were_expected_none_is_expected_again_wherever_they_were_found() -> None:
+    standing = StandingPlanner(felt(0.07, 0.07, 0.10), TIP, WINDOW_rad, SideReach())
+    plan = standing.plan()
+    assert plan is not None
+    assert not plan.only_touch
+    current = standing._current
+    assert current is not None
+    standing.on_grasp(contacts(current.touches_m + [0.0, 0.0, 0.02], (0, 0, 1)))
+    assert standing.felt.distances_m(current.touches_m).max() == 0.0
 
 
 def test_a_blocked_touch_is_not_tried_again() -> None:
