@@ -210,13 +210,15 @@ class Toucher:
     def _meet_again(self, lane: Lane) -> None:
         """What was met on the way to another lane, of a handle perhaps, is felt: the hand has turned back from it."""
         s, motion, over = self.settings, self._motion, lane.joints(self._motion, _AWAY_m)
+        back = motion.runtime.perception.hand.base_q.copy()
         motion.runtime.begin_closing()
-        way = over[:3] - motion.runtime.perception.hand.base_q[:3]
+        way = over[:3] - back[:3]
         along = motion.runtime.world_T_mount.rotation().rotate(way / np.linalg.norm(way))
         if self._approach(over, s.side_m_s):
             direction = np.asarray(lane.frame.pose.rotation().unrotate(along))
             self._lay_on(lane.table, lane.column, direction, lane.frame, s.alone_N, s.sink_m)
             self.capture()
+        motion.move_base(back, *self._travel)
 
     def _rise_over(self, frame: GraspFrame, table: Closing, away_m: float) -> None:
         """Up to where the hand may travel."""
