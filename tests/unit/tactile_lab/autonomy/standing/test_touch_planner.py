@@ -185,15 +185,19 @@ def passed(ends_m: np.ndarray, touched: bool = False) -> list[ApproachPath]:
 def test_a_side_is_expected_behind_where_fingertips_passed_and_nowhere_once_they_passed_the_middle() -> None:
     known, way = felt(0.12, 0.12, 0.06), np.array([np.cos(0.2), np.sin(0.2)])
     front_m = np.array([*(known.middle_m - 0.06 * way), 0.02])
+
+    def beyond_m(ahead_m: float, up_m: float) -> np.ndarray:
+        return front_m[None] + np.array([*(ahead_m * way), up_m])
+
     assert known.passed_m(front_m, way) == 0.0
-    known.on_passed(passed(front_m + [[*(0.012 * way), 0.003]]))
-    known.on_passed(passed(front_m + [[*(0.030 * way), 0.0]], touched=True))
-    known.on_passed(passed(front_m + [[*(0.030 * way), 0.02]]))
+    known.on_passed(passed(beyond_m(0.012, 0.003)))
+    known.on_passed(passed(beyond_m(0.030, 0.0), touched=True))
+    known.on_passed(passed(beyond_m(0.030, 0.02)))
     assert known.passed_m(front_m, way) == pytest.approx(0.012)
     assert known.passed_m(front_m, -way) == 0.0
     box, touches = known.standing_box, planner(known)
     np.testing.assert_allclose(touches._front_m(box, known.middle_m, way, 0.02), (front_m[:2] + 0.012 * way))
-    known.on_passed(passed(front_m + [[*(0.061 * way), 0.0]]))
+    known.on_passed(passed(beyond_m(0.061, 0.0)))
     assert touches._front_m(box, known.middle_m, way, 0.02) is None
 
 
@@ -204,7 +208,7 @@ def test_where_contacts_were_expected_none_is_expected_again_wherever_they_were_
     assert not plan.only_touch
     current = standing._current
     assert current is not None
-    standing.on_grasp(contacts(current.touches_m + [0.0, 0.0, 0.02], (0, 0, 1)))
+    standing.on_grasp(contacts(current.touches_m + np.array([0.0, 0.0, 0.02]), (0, 0, 1)))
     assert standing.felt.distances_m(current.touches_m).max() == 0.0
 
 
