@@ -42,7 +42,8 @@ if TYPE_CHECKING:
     from tactile_lab.slam.result import SlamResult, SlamStep
     from tactile_lab.slam.shape.selection.models import SHAPE_MODELS
     from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
-    from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+    from tactile_lab.slam.slam_settings import SlamSettings
+    from tactile_lab.slam.tactile_slam import TactileSlam
     from tactile_lab.slam.tracking.tracker import Tracker
     from tactile_lab.slam.tracking.trackers import METHODS, TrackerStart
     from tactile_lab.workflow.exporters import EXPORTERS

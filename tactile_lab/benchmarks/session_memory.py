@@ -16,7 +16,8 @@ from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, known_shape
 from tactile_lab.experiments.data import planar_data
 from tactile_lab.slam.doubt.assessment import Assessment
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 GRASPS, BEGINNING = 200, 20
 """Of the session, and after how many memory should stay what it is."""

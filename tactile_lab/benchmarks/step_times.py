@@ -14,7 +14,8 @@ from drivers.core.contacts import Array, Grasp
 from tactile_lab.benchmarks.components import Timing, TimingTable
 from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 PLANAR_SHAPES = ("rectangle", "ellipse", "L")
 PLANAR_GRASPS, SPATIAL_GRASPS, LONG_SESSION = 16, 24, 100

@@ -17,7 +17,7 @@ MOST_JOBS = 256
 
 
 OUR_METHODS = ("joint", "particle", "thesis-pf", "thesis-pf-graph", "known-pose", "odometry", "icp")
-"""Estimation methods, named as in :class:`tactile_lab.slam.tactile_slam.SlamSettings`; plug-ins have more."""
+"""Estimation methods, named as in :class:`tactile_lab.slam.slam_settings.SlamSettings`; plug-ins have more."""
 
 
 def _known_method(name: str | None) -> str | None:

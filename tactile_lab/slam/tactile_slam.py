@@ -30,7 +30,6 @@ from dataclasses import replace
 import numpy as np
 from gtsam import Pose3
 from numpy.typing import NDArray
-from pydantic import Field
 
 from drivers.core.contacts import Array, Contact, Grasp
 from drivers.core.errors import TrackingError
@@ -41,12 +40,13 @@ from tactile_lab.slam.doubt.assessment import Assessment, assess
 from tactile_lab.slam.doubt.heights import side_heights_m
 from tactile_lab.slam.doubt.rivals import displaced
 from tactile_lab.slam.doubt.status import Alternative
-from tactile_lab.slam.graph.back_end import BackEnd, BackEndSettings
+from tactile_lab.slam.graph.back_end import BackEnd
 from tactile_lab.slam.graph.relocation import relocated_poses
 from tactile_lab.slam.result import SlamResult, SlamStep, Verdict
 from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.shape.selection.models import ShapeName
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.step_log import StepLog
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet, placement_sigma_m
 from tactile_lab.slam.tracking.contacts.first_pose import first_pose_vector
@@ -57,37 +57,12 @@ from tactile_lab.slam.tracking.tracker import Tracker
 from tactile_lab.slam.tracking.trackers import (
     GRAPH_METHODS,
     THESIS_METHODS,
-    TrackingSettings,
     checked_known_poses,
     make_tracker,
 )
 from tactile_lab.slam.trajectory import Trajectory
 
 _STAYS = 1e-9
-
-
-class SlamSettings(TrackingSettings):
-    """All parameters of the method.
-
-    Attributes:
-        back_end: the pose graph.
-        least_first_contacts: the first grasp with this many contacts defines the object frame; contacts of grasps
-            before it count as long as the hand has not carried the object since.
-        placement_limit_m: see the module's docstring.
-        shape_model: of the final outline or surface; "auto" is chosen by evidence.
-        lost_after: successive untracked grasps after which the object counts as lost.
-        contour_resolution_m, mesh_resolution_m: of the final shape.
-        largest_sigma_m: also write the part of the shape with a standard deviation below this; None: do not.
-    """
-
-    back_end: BackEndSettings = BackEndSettings()
-    least_first_contacts: int = Field(default=3, ge=1)
-    placement_limit_m: float = Field(default=0.010, gt=0)
-    lost_after: int = Field(default=4, ge=1)
-    shape_model: ShapeName = "auto"
-    contour_resolution_m: float = Field(default=0.001, gt=0)
-    mesh_resolution_m: float = Field(default=0.003, gt=0)
-    largest_sigma_m: float | None = Field(default=None, gt=0)
 
 
 class TactileSlam:
@@ -127,12 +102,9 @@ class TactileSlam:
         self._waiting: tuple[Contact, ...] = ()
         """Contacts of grasps before the object frame, while the object stays where it is."""
 
-        self._steps: list[SlamStep] = []
+        self._log = StepLog(self._settings.lost_after)
         self._heights_m: Array = np.empty(0)
         """Of the contacts of an outline so far, over the table."""
-
-        self._empty_touches: list[bool] = []
-        """Of each grasp, whether it was a touch alone that met nothing."""
 
         self._shape = CurrentShape(self._settings, self._settings.shape_model)
         self._has_ended = False
@@ -145,7 +117,7 @@ class TactileSlam:
     @property
     def step_count(self) -> int:
         """Number of grasps added so far."""
-        return len(self._steps)
+        return len(self._log)
 
     @on_one_thread
     def add_grasp(self, grasp: Grasp) -> SlamStep:
@@ -156,9 +128,8 @@ class TactileSlam:
         try:
             return self._step(grasp)
         except TrackingError as error:
-            step = self._step(replace(grasp, contacts=()))
-            self._steps[-1] = replace(step, reason=str(error))
-            return self._steps[-1]
+            self._step(replace(grasp, contacts=()))
+            return self._log.tell_last(str(error))
 
     def _step(self, grasp: Grasp) -> SlamStep:
         """Raises TrackingError: the grasp has entries that are not finite, or wrong units; nothing was changed."""
@@ -198,7 +169,7 @@ class TactileSlam:
             dimension=self._settings.dimension,
             world_T_object=trajectory.poses,
             covariances=covariances,
-            steps=tuple(self._steps),
+            steps=self._log.steps,
             loops=self._back_end.reports,
             surface=self.surface,
             contour=told.shape if isinstance(told.shape, Contour) else None,
@@ -214,7 +185,7 @@ class TactileSlam:
     @property
     def world_T_object(self) -> Pose3 | None:
         """The present pose; None before the object frame is defined."""
-        return self._trajectory.poses[-1] if self._steps else None
+        return self._trajectory.poses[-1] if self._log else None
 
     @property
     def trajectory(self) -> tuple[Pose3 | None, ...]:
@@ -224,7 +195,7 @@ class TactileSlam:
     @property
     def pose_covariance(self) -> Array | None:
         """Covariance of the present (x m, y m, yaw rad) in the world, shape (3, 3)."""
-        return self._trajectory.covariances[-1] if self._steps else None
+        return self._trajectory.covariances[-1] if self._log else None
 
     @property
     def origin_height_m(self) -> float:
@@ -243,7 +214,7 @@ class TactileSlam:
 
     @property
     def _trajectory(self) -> Trajectory:
-        return Trajectory(self._tracker, len(self._steps), self._origin_height_m)
+        return Trajectory(self._tracker, len(self._log), self._origin_height_m)
 
     def _shape_contacts(self) -> ContactMap | None:
         if self._tracker is None:
@@ -283,7 +254,7 @@ class TactileSlam:
             self._tracker,
             shape,
             self._settings,
-            self._refused,
+            self._log.refused(self._tracker),
             lost=self.is_lost,
             origin_height_m=self._origin_height_m,
             heights_m=self._heights_m,
@@ -307,17 +278,7 @@ class TactileSlam:
     @property
     def is_lost(self) -> bool:
         """See the module's docstring; a session without an object frame is lost as well."""
-        refused = [each for each, empty in zip(self._refused, self._empty_touches, strict=True) if not empty]
-        recent = refused[-self._settings.lost_after :]
-        all_recent = len(recent) == self._settings.lost_after and all(recent)
-        return self._tracker is None or all_recent or 2 * sum(refused) > len(refused)
-
-    @property
-    def _refused(self) -> list[bool]:
-        """Of every grasp, whether it was untracked and still has no place."""
-        placed = self._tracker.map.placed if self._tracker else ()
-        later = [False] * (len(self._steps) - len(placed)) + [grasp.used for grasp in placed]
-        return [step.verdict == "untracked" and not used for step, used in zip(self._steps, later, strict=True)]
+        return self._log.is_lost(self._tracker)
 
     def _begin_anew(self) -> None:
         self._tracker, self._origin_height_m, self._waiting = None, 0.0, ()
@@ -334,7 +295,7 @@ class TactileSlam:
         if len(contacts) < least:
             reason = f"{len(contacts)} contacts, the object frame needs {least}"
             return self._record(grasp, contacts, "untracked", reason, started)
-        following = None if self._known_poses is None else self._known_poses[len(self._steps) :]
+        following = None if self._known_poses is None else self._known_poses[len(self._log) :]
         if following is not None and (not following or following[0] is None):
             return self._record(grasp, contacts, "untracked", "its true pose is not known", started)
         on_table = self._settings.freedom == "table"
@@ -357,20 +318,17 @@ class TactileSlam:
     def _record(self, grasp: Grasp, contacts: ContactSet, verdict: Verdict, reason: str, started: float) -> SlamStep:
         placed = self._tracker.map.placed[-1] if self._tracker else None
         seen_by = planar_observability if self._settings.freedom == "table" else observability
-        seen = seen_by(contacts.points_m, contacts.normals).smallest if len(contacts) else 0.0
         step = SlamStep(
             index=grasp.index,
             stamp_ns=grasp.stamp_ns,
             world_T_object=self._space.pose(placed.pose, self._origin_height_m) if placed else None,
             covariance=placed.covariance if placed else None,
             effective_count=self._tracker.effective_count if self._tracker else 0.0,
-            observability=seen,
+            observability=seen_by(contacts.points_m, contacts.normals).smallest if len(contacts) else 0.0,
             verdict=verdict,
             reason=reason,
             contacts=len(contacts),
             contacts_used=len(placed.kept) if placed else 0,
             seconds=time.perf_counter() - started,
         )
-        self._steps.append(step)
-        self._empty_touches.append(not (grasp.contacts or grasp.has_closed))
-        return step
+        return self._log.add(step, grasp)

@@ -20,7 +20,7 @@ from tactile_lab.rigs.description import RigDescription
 from tactile_lab.rigs.emulate import EMULATORS
 from tactile_lab.slam.exploration.policies import POLICIES
 from tactile_lab.slam.shape.selection.models import SHAPE_MODELS
-from tactile_lab.slam.tactile_slam import SlamSettings
+from tactile_lab.slam.slam_settings import SlamSettings
 from tactile_lab.slam.tracking.trackers import METHODS
 from tactile_lab.workflow.exporters import EXPORTERS
 

@@ -21,7 +21,8 @@ from tactile_lab.evaluation.files.mesh_io import read_mesh
 from tactile_lab.evaluation.files.result_files import write_results
 from tactile_lab.evaluation.prism import open_ring
 from tactile_lab.slam.shape.planar.outlines import is_simple
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, remove_results, write_evaluation
 from tactile_lab.workflow.replaying import check_replaceable, recorded_seed, recorded_slam, replay_session
 
@@ -37,7 +38,7 @@ class Wishes:
         method: by name, see :class:`tactile_lab.slam.tracking.trackers.TrackingSettings`.
         dimension: 2 or 3.
         seed: of all that is left to chance.
-        settings: a YAML file with any part of :class:`tactile_lab.slam.tactile_slam.SlamSettings`.
+        settings: a YAML file with any part of :class:`tactile_lab.slam.slam_settings.SlamSettings`.
         shape: model of the final shape by name, see :data:`tactile_lab.slam.shape.selection.models.SHAPE_MODELS`.
         largest_sigma_m: write the parts of the shape that are known so well once more, apart.
     """

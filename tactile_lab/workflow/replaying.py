@@ -17,7 +17,8 @@ from sessions.recording.traffic.loss import Loss
 from tactile_lab.evaluation.truth.session_truth import session_truth
 from tactile_lab.rigs.build import build_interpreter
 from tactile_lab.rigs.description import OTHER_VERSION, rig_of_session
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.finishing import (
     RESULT_FILES,
     FinishedSession,

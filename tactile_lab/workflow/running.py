@@ -27,7 +27,8 @@ from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.rigs.laboratory import Laboratory, open_laboratory
 from tactile_lab.rigs.recording import record_camera, stampers, traffic_settings
 from tactile_lab.slam.exploration.policies import make_policy
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.workflow.attending import Attendance, roles_for, settings_for
 from tactile_lab.workflow.finishing import FinishedSession, estimate_rest, finish

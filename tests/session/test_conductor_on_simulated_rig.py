@@ -31,7 +31,8 @@ from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.autonomy.variance_planner import ExplorationSettings
 from tactile_lab.rigs.build import build_runtime
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.low_rig import BRISK_WAY
 
 SEED = 0

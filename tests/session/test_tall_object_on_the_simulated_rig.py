@@ -20,7 +20,8 @@ from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.rigs.build import build_runtime
 from tactile_lab.rigs.description import load_rig
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 SIZE_m = (0.050, 0.085, 0.150)
 TURN_rad = 0.3

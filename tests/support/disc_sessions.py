@@ -12,7 +12,8 @@ from sessions.conductor.progress import GraspReport, NullProgress
 from sessions.conductor.session_outcome import SessionOutcome
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.settings import SessionSettings
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.disc_world import Disc, DiscWorld
 
 

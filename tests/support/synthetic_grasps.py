@@ -12,7 +12,8 @@ from gtsam import Pose2, Pose3
 from drivers.core.contacts import FINGERS, Contact, Grasp
 from drivers.core.poses import rotate, spatial, transform_points
 from tactile_lab.slam.result import SlamResult
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 GRASPS = 5
 SIZE_m = (0.10, 0.06, 0.04)

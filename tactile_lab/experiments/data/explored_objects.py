@@ -16,7 +16,8 @@ from tactile_lab.experiments.data.planar_hand import PlanarHand, slip
 from tactile_lab.experiments.data.sensing import SLIP_SIGMA_m, SLIP_SIGMA_rad
 from tactile_lab.slam.exploration.policy import Belief
 from tactile_lab.slam.exploration.prediction import sampled_displacements
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise, compose, pose_vector, sample_motion
 
 _SAMPLED_SURFACES, _PARTICLES = 16, 500

@@ -22,7 +22,8 @@ from tactile_lab.experiments.data.sensing import SimulatedGrasps, by_biased_fing
 from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.experiments.touched_metrics import touched_figures
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import UNHELD
 
 Overlay: TypeAlias = Mapping[str, Mapping[str, Any]]

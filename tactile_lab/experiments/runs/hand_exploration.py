@@ -24,7 +24,8 @@ from tactile_lab.experiments.runs.coverage_monitor import CoverageMonitor, Until
 from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 OBJECTS = (
     "box-10x6x4",

@@ -21,7 +21,8 @@ from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.surfaces.surface import Contour
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import compose, planar_motion, spatial_pose

@@ -28,7 +28,8 @@ from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, 
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 
 FIRST, SECOND, FINGERS, HELD = "first", "second", "fingers", "held"

@@ -18,7 +18,8 @@ from tactile_lab.experiments.thesis.shape_drawings import millimetres
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
 from tactile_lab.slam.shape.metrics.metrics import contour_errors, mesh_errors
 from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 _DRAWN_STEP_m = 0.001
 

@@ -19,7 +19,8 @@ from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.data import planar_data
 from tactile_lab.experiments.data.sensing import SLIP_SIGMA_m, SLIP_SIGMA_rad
 from tactile_lab.experiments.run_metrics import slam_figures
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.filter.measurement import GateSettings
 from tactile_lab.slam.tracking.trackers import THESIS_SHAPE
 

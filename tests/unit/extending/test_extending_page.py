@@ -26,7 +26,8 @@ from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.autonomy.slam_service import SlamService
 from tactile_lab.cli.app import app
 from tactile_lab.evaluation.files.tables import read_contour
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.extending_page import PAGE, Written, files, rig_keys
 from tests.support.low_rig import SHIPPED, low_rig
 

@@ -26,7 +26,8 @@ from tactile_lab.cli.main import main
 from tactile_lab.evaluation.evaluation import Evaluation
 from tactile_lab.experiments.data import planar_data
 from tactile_lab.slam.exploration.policies import make_policy
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.attending import Attendance, roles_for
 from tactile_lab.workflow.reconstructing import Wishes, reconstruct_log
 from tests.support.disc_world import Disc, DiscWorld

@@ -22,7 +22,8 @@ from drivers.fingertips.kinds import FINGERTIPS
 from sessions.recording.session import Session
 from tactile_lab.cli.app import app
 from tactile_lab.slam.exploration.policies import POLICIES, make_policy
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.exporters import EXPORTERS, export_as
 from tactile_lab.workflow.plugging import changed_plugins, check_plugins, refused_plugins
 

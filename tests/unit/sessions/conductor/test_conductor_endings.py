@@ -14,7 +14,8 @@ from sessions.conductor.decisions import AutonomousDecisions
 from sessions.conductor.session_outcome import Ending
 from sessions.recording.session_events import EventKind
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.disc_sessions import Watcher, disc, run, settings
 from tests.support.disc_world import DiscWorld
 

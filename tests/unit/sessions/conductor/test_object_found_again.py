@@ -9,7 +9,8 @@ from sessions.conductor.conductor import Conductor
 from sessions.conductor.session_outcome import Ending, SessionOutcome
 from sessions.recording.session_events import EventKind
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.disc_sessions import Watcher, settings
 from tests.support.disc_world import Disc, DiscWorld
 

@@ -17,7 +17,8 @@ from drivers.core.contacts import ApproachPath, Contact, Grasp, StepSigma
 from drivers.core.errors import ConfigurationError
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, read_contact_log, write_contact_log
 from tactile_lab.experiments.data.planar_data import simulate
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.repository import REPOSITORY
 
 coordinates = st.floats(-0.25, 0.25)

@@ -24,7 +24,8 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.recording.attachments import Attachments
 from tactile_lab.autonomy.guided_roles import guided_roles
 from tactile_lab.autonomy.settings import SessionSettings
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.baseline import assert_baseline
 from tests.support.disc_world import BaseState, Disc, DiscWorld, Reading
 from tests.support.motion_trace import TracedWorld

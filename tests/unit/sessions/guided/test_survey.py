@@ -15,7 +15,8 @@ from sessions.guided.operator import Ask, Panel, Request, Stage
 from sessions.guided.simulated_operator import Cue, SimulatedOperator
 from tactile_lab.autonomy.guided_roles import guided_roles
 from tactile_lab.autonomy.settings import SessionSettings
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.disc_world import Disc, DiscWorld
 
 QUICK = {"squeeze_s": 0.1, "finger_rad_s": 20.0, "travel_m_s": 1.0, "turn_rad_s": 5.0}

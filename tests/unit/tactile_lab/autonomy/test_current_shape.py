@@ -17,7 +17,8 @@ from tactile_lab.autonomy.unknown_part import describe_unknown
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, known_shape
 from tactile_lab.slam.exploration.rewards import explored_share
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.box_shapes import solid_contacts
 
 CORNERS_m = np.array([[x, y, 0.04] for x in (-0.05, 0.05) for y in (-0.03, 0.03)])

@@ -31,7 +31,8 @@ from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.autonomy.estimator_process import EstimatorProcess
 from tactile_lab.autonomy.estimator_worker import pack
 from tactile_lab.autonomy.settings import SessionSettings
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.finishing import estimate_rest
 from tests.support import questions
 from tests.support.disc_world import Disc, DiscWorld

@@ -25,7 +25,8 @@ from tactile_lab.evaluation.shape import horizontal_outline
 from tactile_lab.evaluation.table import evaluation_rows
 from tactile_lab.evaluation.truth.session_truth import marked_pictures
 from tactile_lab.experiments.data.planar_data import PlanarGrasps, simulate
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.synthetic_grasps import GRASPS, Recorded, SIZE_m, box_grasps, result_of
 
 

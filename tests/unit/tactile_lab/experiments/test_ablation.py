@@ -31,7 +31,8 @@ from tactile_lab.experiments.runs.ablation_runs import (
 )
 from tactile_lab.experiments.touched_metrics import touched_figures
 from tactile_lab.slam.shape.fields.settings import GpisSettings, ShapePart
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.contacts.motion import UNHELD, MotionNoise

@@ -14,7 +14,8 @@ from tactile_lab.experiments.data.solids import solid
 from tactile_lab.experiments.run_metrics import NO_SIZES, contour_figures, mesh_figures, size_figures, slam_figures
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 
 def test_the_truth_itself_has_no_error_and_is_covered() -> None:

@@ -8,7 +8,8 @@ from gtsam import Pose3, Rot3
 
 from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.experiments.data.carried_off import carried_off
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.simulated_contacts import registration_mm
 
 

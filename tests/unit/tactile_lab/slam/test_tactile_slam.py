@@ -20,7 +20,8 @@ from tactile_lab.slam import current_shape
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.metrics import contour_errors
 from tactile_lab.slam.shape.surfaces.surface import Contour
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.simulated_contacts import registration_mm
 
 
@@ -197,12 +198,12 @@ def test_a_session_without_any_contact_is_lost_but_finishes() -> None:
 @pytest.mark.parametrize("method", ["joint", "particle", "thesis-pf-graph"])
 def test_a_grasp_that_met_nothing_keeps_the_prediction_and_grows_uncertain(method: str) -> None:
     slam = TactileSlam(settings(method=method, particles=2_000, back_end={"enabled": False}))
-    slam.add_grasp(FOUR.grasps[0])
+    first = slam.add_grasp(FOUR.grasps[0])
     empty = with_contacts(FOUR.grasps[1], 0)
     step = slam.add_grasp(empty)
     assert step.verdict == "untracked"
     assert step.contacts_used == 0
-    predicted = empty.hand_motion_world.compose(slam._steps[0].world_T_object)
+    predicted = empty.hand_motion_world.compose(first.world_T_object)
     assert np.allclose(step.world_T_object.translation()[:2], predicted.translation()[:2], atol=0.002)
     assert step.covariance[0, 0] > 0.5e-4
 

@@ -16,7 +16,8 @@ from sessions.guided.operator import Panel, Request
 from sessions.recording.recorder import Recorder
 from sessions.recording.traffic import schemas
 from tactile_lab.autonomy.settings import SessionSettings
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.attending import Attendance, roles_for
 from tests.support.disc_world import Disc, DiscWorld
 

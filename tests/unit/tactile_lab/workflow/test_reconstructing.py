@@ -14,7 +14,8 @@ from drivers.core.errors import ConfigurationError
 from sessions.exchange.contact_log import ContactLog, MotionSigma, ObjectTruth, write_contact_log
 from tactile_lab.experiments.data.planar_data import PlanarGrasps, simulate
 from tactile_lab.slam.result import SlamResult
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.workflow.reconstructing import Wishes, log_settings, log_truth, reconstruct, reconstruct_log
 
 DATA = simulate("rectangle", 3, count=6)

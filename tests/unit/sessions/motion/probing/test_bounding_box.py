@@ -24,7 +24,8 @@ from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.settings import SessionSettings
 from tactile_lab.autonomy.variance_planner import ExplorationSettings
 from tactile_lab.experiments.data.outlines import first_crossing
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.disc_world import Disc, DiscWorld, TIP_CENTRE_m
 
 TIP = HandShape((0.0085, 0.0085, 0.0085), tuple(TIP_CENTRE_m))

@@ -20,7 +20,8 @@ from tactile_lab.evaluation.files.results import read_results
 from tactile_lab.evaluation.files.tables import contacts_text, contour_text, read_contacts, read_contour
 from tactile_lab.evaluation.prism import open_ring, prism, signed_area_m2, triangulate
 from tactile_lab.slam.result import SlamResult
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.synthetic_grasps import Recorded, SIZE_m, box_grasps, result_of
 
 ELL = np.array([[0, 0], [0.10, 0], [0.10, 0.03], [0.03, 0.03], [0.03, 0.06], [0, 0.06]])

@@ -12,7 +12,8 @@ from tactile_lab.experiments.data.true_surface import lay_over, reachable_points
 from tactile_lab.experiments.runs.coverage_monitor import CoverageMonitor, Look
 from tactile_lab.experiments.runs.hand_exploration import OBJECTS
 from tactile_lab.slam.exploration.policy import Surface
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 
 def test_outline_is_what_fingers_reach_in_the_plane() -> None:

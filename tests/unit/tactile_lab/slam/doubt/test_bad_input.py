@@ -14,7 +14,8 @@ from drivers.core.poses import spatial
 from tactile_lab.experiments.data import planar_data
 from tactile_lab.experiments.data.carried_off import carried_off
 from tactile_lab.slam.result import SlamResult
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 HALF_m = 0.045
 OUTWARD = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from drivers.core.contacts import Contact, Grasp
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 
 def _grasp(number: int, heights_m: tuple[float, ...], top_m: float) -> Grasp:

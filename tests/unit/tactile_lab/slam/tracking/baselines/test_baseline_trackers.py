@@ -17,7 +17,8 @@ from tactile_lab.experiments.data.planar_data import simulate
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.touched_metrics import touched_figures
 from tactile_lab.slam.result import SlamResult
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tests.support.simulated_contacts import registration_mm
 
 

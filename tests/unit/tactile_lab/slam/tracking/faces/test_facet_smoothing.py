@@ -11,7 +11,8 @@ from drivers.core.contacts import Array
 from tactile_lab.experiments.data import planar_data
 from tactile_lab.experiments.run_metrics import slam_figures
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother, smoothed_with_faces

@@ -11,7 +11,9 @@ from gtsam import Pose3
 
 from drivers.core.contacts import FINGERS, Grasp
 from tactile_lab.experiments.data.sensing import measured_contact
-from tactile_lab.slam.tactile_slam import SlamSettings, SlamStep, TactileSlam
+from tactile_lab.slam.result import SlamStep
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 
 Touch: TypeAlias = tuple[tuple[float, float, float], tuple[float, float, float]]
 """Where a fingertip touches, in millimetres, and the outward normal there."""

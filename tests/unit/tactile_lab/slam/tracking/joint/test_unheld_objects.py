@@ -12,7 +12,8 @@ from drivers.core.poses import planar
 from tactile_lab.experiments.data.outlines import OUTLINES_m
 from tactile_lab.experiments.data.planar_hand import PlanarHand
 from tactile_lab.slam.shape.fields.settings import GpisSettings
-from tactile_lab.slam.tactile_slam import SlamSettings, TactileSlam
+from tactile_lab.slam.slam_settings import SlamSettings
+from tactile_lab.slam.tactile_slam import TactileSlam
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved, PlacedGrasp
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 from tactile_lab.slam.tracking.joint import deferred_association
