@@ -49,7 +49,7 @@ class CarryNoise:
     """
 
     least_m: float = 0.000035
-    least_rad: float = float(np.deg2rad(0.13))
+    least_rad: float = float(np.deg2rad(0.18))
     spread_m: float = 0.45
     spread_rad: float = 0.12
     slip_m: float = 0.024
