@@ -208,13 +208,15 @@ class Toucher:
         return motion.probe_base(over, cycle.approach_m_s, self.guard.is_met)
 
     def _meet_again(self, lane: Lane) -> None:
-        """What was met on the way to another lane, of a handle perhaps, is felt: the hand has turned back from it."""
+        """What a fingertip met on the way to another lane, of a handle perhaps, is felt: the hand has turned back from
+        it. A link is not pressed against it.
+        """
         s, motion, over = self.settings, self._motion, lane.joints(self._motion, _AWAY_m)
         back = motion.runtime.perception.hand.base_q.copy()
         motion.runtime.begin_closing()
         way = over[:3] - back[:3]
         along = motion.runtime.world_T_mount.rotation().rotate(way / np.linalg.norm(way))
-        if self._approach(over, s.side_m_s):
+        if self._approach(over, s.side_m_s) and LINKS not in self.guard.met:
             direction = np.asarray(lane.frame.pose.rotation().unrotate(along))
             self._lay_on(lane.table, lane.column, direction, lane.frame, s.alone_N, s.sink_m)
             self.capture()

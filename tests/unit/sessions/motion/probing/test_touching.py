@@ -213,6 +213,23 @@ def test_what_stands_in_the_way_along_a_side_is_felt_and_the_hand_goes_back_wher
 
 
 @pytest.mark.parametrize("met", [("links",), ("FF",)])
+def test_a_link_that_met_something_along_a_side_is_not_pressed_against_it(
+    met: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion, laid_on = motion_on(DiscWorld(None)), []
+    toucher, place = Toucher(motion, QUICK, TIP), TouchPlace(GraspFrame(0.1, 0.05, 0.0), 0.05)
+    table = closing("pinch-from-left", 0.05, TIP)
+    monkeypatch.setattr(toucher.guard, "is_met", lambda: True)
+    monkeypatch.setattr(toucher.guard, "restart", lambda: None)
+    monkeypatch.setattr(toucher.guard, "met", met)
+    monkeypatch.setattr(toucher, "_lay_on", lambda *given: laid_on.append(given))
+    before = motion.runtime.perception.hand.base_q.copy()
+    toucher._meet_again(Lane(table, lowest_ahead(table, TIP, 0.05), place, 0.012, 0.02))
+    assert len(laid_on) == (met == ("FF",))
+    np.testing.assert_allclose(motion.runtime.perception.hand.base_q, before, atol=1e-3)
+
+
+@pytest.mark.parametrize("met", [("links",), ("FF",)])
 def test_where_a_link_stands_on_the_object_no_fingertip_is_laid_on(
     met: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
