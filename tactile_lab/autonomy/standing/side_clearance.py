@@ -83,11 +83,13 @@ class StandingBox:
         ways_m = [(np.sign(w) * size / 2 - at) / w for at, w, size in zip(place_m, way, self.size_m, strict=False) if w]
         return float(min(ways_m))
 
-    def outside_m(self, places_m: Array, is_round: bool) -> Array:
-        """Of world places x, y (n, 2) from its outline, or from the circle in it, negative inside, shape (n,)."""
-        if is_round:
-            return np.asarray(np.linalg.norm(places_m - self.centre_m, axis=1) - np.mean(self.size_m[:2]) / 2)
+    def outside_m(self, places_m: Array) -> Array:
+        """Of world places x, y (n, 2) from its outline, negative inside, shape (n,)."""
         return _signed(self._beyond_m(places_m))
+
+    def outside_circle_m(self, places_m: Array) -> Array:
+        """The same from the circle in it."""
+        return np.asarray(np.linalg.norm(places_m - self.centre_m, axis=1) - np.mean(self.size_m[:2]) / 2)
 
     def distances_m(self, places_m: Array) -> Array:
         """Of world places (..., 3) to its surface, negative inside, shape (...)."""

@@ -16,7 +16,6 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, closing, sideways
-from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, TouchPlace
 from sessions.motion.probing.touch_patterns import lowest_touch_m
@@ -61,7 +60,7 @@ class SidePlanner(ActionPlanner):
         lowest_m: height of the lowest fingertip with the first finger down, and up.
     """
 
-    lowest_m: tuple[float, float] = TouchSettings().side_heights_m
+    lowest_m: tuple[float, float]
 
     def best(self) -> StandingCandidate | None:
         """The next grasp; None where nothing is left that would tell anything new."""

@@ -109,7 +109,7 @@ class TouchPlanner(ActionPlanner):
         """
         places_m = np.array([frame.pose.transformFrom(tip_m) for tip_m in tips_m.values()])
         places_m[:, 2] = box.size_m[2]
-        outside_m = box.outside_m(places_m[:, :2], is_round)
+        outside_m = (box.outside_circle_m if is_round else box.outside_m)(places_m[:, :2])
         meets = outside_m < -_INSIDE_m / 2
         if (outside_m[~meets] < self.hand.radius_m + _BESIDE_m).any():
             return {}
@@ -120,22 +120,20 @@ class TouchPlanner(ActionPlanner):
 
     def _sides(self) -> Iterator[StandingCandidate]:
         """Every side that the arm can come to, in lanes, at heights where the object is not tipped over."""
-        storeys, share = self.felt.storeys, _SQUARELY if self.felt.is_round else 1.0
+        storeys = self.felt.storeys
         for yaw_rad in self.felt.yaws(self.yaw_window_rad, _ASKEW_rad):
             for side in SIDES:
-                lowest_m = lowest_touch_m(side, self.settings.side_heights_m, self.hand)
-                places = self._on_side(storeys, share, yaw_rad, sideways(COLUMN.closing, side), lowest_m)
+                places = self._on_side(storeys, yaw_rad, side)
                 yield from self._going_on([one for one in places if self._is_open(one)])
 
-    def _on_side(
-        self, storeys: Storeys, share: float, yaw_rad: float, name: str, lowest_m: float
-    ) -> Iterator[StandingCandidate]:
-        """Touches from one side, in lanes that far from the middle as a share of the half width."""
+    def _on_side(self, storeys: Storeys, yaw_rad: float, side: str) -> Iterator[StandingCandidate]:
+        """Touches by a hand that comes from one side, in lanes beside one another, one above the other."""
+        name, lowest_m = sideways(COLUMN.closing, side), lowest_touch_m(side, self.settings.side_heights_m, self.hand)
         box, across = self.felt.standing_box, np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.hand)
         if not self.felt.may_be_pushed(way):
             return
-        foot_m = box.foot_along_m(way)
+        foot_m, share = box.foot_along_m(way), _SQUARELY if self.felt.is_round else 1.0
         up_to_m = min(slides_up_to_m(foot_m), box.size_m[2] - _INSIDE_m)
         low_m, laid_m = (lowest_m + 1e-9, 0.0) if self.felt.is_slender(way) else (np.inf, up_to_m)
         for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m).tolist():

@@ -132,15 +132,15 @@ def test_no_finger_of_a_tap_comes_down_on_an_edge() -> None:
     for one in taps:
         tips_m = [table.path(finger).centre_m(TAP.progress[finger]) for finger in table.fingers]
         places_m = np.array([one.plan.frame.pose.transformFrom(tip_m)[:2] for tip_m in tips_m])
-        outside_m = box.outside_m(places_m, False)
+        outside_m = box.outside_m(places_m)
         assert np.all((outside_m < -0.004) | (outside_m > TIP.radius_m + 0.004))
 
 
 def test_what_is_round_ends_before_its_box_does() -> None:
     box = StandingBox(0.1, -0.2, 0.3, (0.08, 0.08, 0.05))
     corner_m = box.centre_m + 0.05 * np.array([[np.cos(0.3 + np.pi / 4), np.sin(0.3 + np.pi / 4)]])
-    assert box.outside_m(corner_m, False)[0] < 0.0
-    assert box.outside_m(corner_m, True)[0] == pytest.approx(0.01)
+    assert box.outside_m(corner_m)[0] < 0.0
+    assert box.outside_circle_m(corner_m)[0] == pytest.approx(0.01)
 
 
 def test_where_a_tap_met_nothing_the_top_is_open_and_no_fingertip_is_expected_there() -> None:
