@@ -52,7 +52,7 @@ class CarryGuard:
         s = self._settings
         self._fingers.servo_forces(self._targets_N, s.carry_slack)
         pressed = self._fingers.pressed(s.pressed_N)
-        self._pressed_cycles = self._pressed_cycles + 1 if pressed else 0
+        self._pressed_cycles = max(0, self._pressed_cycles + (1 if pressed else -1))
         if self._pressed_cycles > s.pressed_cycles:
             self.jammed = pressed
         self._cycles += 1

@@ -97,7 +97,7 @@ class CycleSettings(StrictModel):
         ease_force_N: force of each finger when a carried object is let go; the thumb balances the others.
         ease_s: time in which the squeeze goes down to it.
         pressed_N: force on a fingertip above which no other finger presses harder.
-        pressed_cycles: cycles in a row with that force after which re-orientation stops.
+        pressed_cycles: cycles with that force after which re-orientation stops; one without it makes up for one with.
         carry_turn_rad_s, carry_m_s: speeds while the object is held.
         carry_slack: share by which the forces may be off meanwhile: fingers that yield to each newton with which the
             table pulls let the object slip.
@@ -139,7 +139,7 @@ class CycleSettings(StrictModel):
     ease_force_N: float = Field(default=0.15, gt=0.0)
     ease_s: float = Field(default=0.4, gt=0.0)
     pressed_N: float = Field(default=3.5, gt=0.0)
-    pressed_cycles: int = Field(default=5, ge=1)
+    pressed_cycles: int = Field(default=2, ge=1)
     carry_turn_rad_s: float = Field(default=0.6, gt=0.0)
     carry_m_s: float = Field(default=0.06, gt=0.0)
     carry_slack: float = Field(default=0.6, ge=0.0, lt=1.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from sessions.motion.carry_guard import CarryGuard, cycles_evenly_along
@@ -22,7 +24,10 @@ class Fingers:
         self.told.append((targets_N, slack))
 
     def pressed(self, force_N):
-        return self._holding if force_N < 0.5 else self._pressed
+        return self._holding if force_N < 0.5 else self._pressed_now()
+
+    def _pressed_now(self):
+        return next(self._pressed, ()) if isinstance(self._pressed, Iterator) else self._pressed
 
 
 def carry(cycles, slips=None, pressed=(), holding=("FF", "TH")):
@@ -69,6 +74,19 @@ def test_what_the_fingers_lose_ends_it_however_little_it_has_slipped():
 @pytest.mark.parametrize("holding", [("FF", "TH"), ("TH",)])
 def test_fingertips_that_tell_no_slip_end_nothing(holding):
     assert carry(100, holding=holding)[2] is None
+
+
+def test_a_fingertip_that_is_pressed_again_and_again_ends_it_as_well():
+    """One that sticks and slips: the force grows, and between two peaks a cycle shows nothing."""
+    told = iter([("TH",), ("TH",), (), ("TH",), ("TH",), ("TH",)])
+    guard, _, ended = carry(100, pressed=told)
+    assert ended == 5
+    assert guard.jammed == ("TH",)
+
+
+def test_jerks_far_apart_end_nothing():
+    told = iter([each for _ in range(30) for each in (("TH",), ("TH",), (), ())])
+    assert carry(100, pressed=told)[2] is None
 
 
 def test_a_fingertip_that_stays_pressed_ends_it():
