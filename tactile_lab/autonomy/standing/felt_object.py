@@ -146,6 +146,10 @@ class FeltObject:
         """
         self._looked_m += list(places_m)
 
+    def look_again(self) -> None:
+        """Places where contacts were expected and found elsewhere, or nowhere, are new again."""
+        self._looked_m = []
+
     def on_pushed(self, way: Array) -> None:
         """It was touched from one side alone along a horizontal unit vector, world, shape (2,)."""
         if self.is_slender(way):

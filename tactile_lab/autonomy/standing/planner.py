@@ -24,6 +24,10 @@ from tactile_lab.autonomy.standing.side_planner import SidePlanner
 from tactile_lab.autonomy.standing.touch_planner import TouchPlanner
 
 _GRASPS, _LEAST_GAIN = 3, 0.01
+
+_ROUNDS = 3
+"""So often every place is looked for: contacts were found beside some, and the box was known less well."""
+
 _UNSTEADY = (
     "does not stay where it is: it was looked for {searches} times already. Steady it (putty under its foot, more "
     "weight) or lay it down (--pose lying), and start again; {size}"
@@ -68,6 +72,7 @@ class StandingPlanner:
     _current: StandingCandidate | None = None
     _touches: int = 0
     _blocked: int = 0
+    _rounds: int = 1
     whereabouts: Whereabouts = field(init=False)
     _grasping: SidePlanner = field(init=False)
     _touching: TouchPlanner | None = field(init=False)
@@ -84,10 +89,18 @@ class StandingPlanner:
         """The next grasp or touch; None where nothing is left that would tell anything new, or it has fallen over."""
         if self.whereabouts.is_given_up:
             return None
+        self._current = self._best()
+        if self._current is None and self._rounds < _ROUNDS:
+            self._rounds += 1
+            self.felt.look_again()
+            self._current = self._best()
+        return None if self._current is None else self._current.plan
+
+    def _best(self) -> StandingCandidate | None:
+        """What would tell most; None where nothing would tell anything new."""
         touch = None if self._touching is None else self._touching.best()
         offers = [self._grasping.best(), self._pinching.best(), touch]
-        self._current = max((one for one in offers if one), key=lambda one: one.score_m, default=None)
-        return None if self._current is None else self._current.plan
+        return max((one for one in offers if one), key=lambda one: one.score_m, default=None)
 
     def touch(self) -> GraspPlan | None:
         """The touch that would tell most; None where none would tell anything new."""

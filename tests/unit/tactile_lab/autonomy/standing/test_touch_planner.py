@@ -242,6 +242,16 @@ def test_what_cannot_be_grasped_is_touched_and_then_ends_in_words() -> None:
     assert "touches, 2 approaches were blocked; the object is 160 x 210 mm wide and 70 mm high" in standing.exhausted
 
 
+def test_places_whose_contacts_were_elsewhere_are_looked_for_two_times_more_before_nothing_is_left() -> None:
+    standing = StandingPlanner(felt(0.16, 0.16, 0.12), TIP, WINDOW_rad, SideReach(), TouchSettings())
+    tried: list[tuple[str, float, float]] = []
+    while (plan := standing.plan()) is not None and len(tried) < 200:
+        tried.append((plan.closing, plan.frame.yaw_rad, plan.height_m))
+        standing.on_grasp(contacts(np.empty((0, 3)), (0, 0, 1)))
+    assert plan is None
+    assert tried.count(tried[0]) >= 3
+
+
 def test_an_object_grows_with_what_is_felt() -> None:
     known = FeltObject.around(np.array([0.1, 0.0]), 0.05, np.empty((0, 3)), np.empty((0, 3)))
     np.testing.assert_allclose(known.middle_m, [0.1, 0.0])
