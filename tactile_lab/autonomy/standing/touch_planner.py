@@ -120,20 +120,20 @@ class TouchPlanner(ActionPlanner):
 
     def _sides(self) -> Iterator[StandingCandidate]:
         """Every side that the arm can come to, in lanes, at heights where the object is not tipped over."""
-        storeys = self.felt.storeys
+        storeys, share = self.felt.storeys, _SQUARELY if self.felt.is_round else 1.0
         for yaw_rad in self.felt.yaws(self.yaw_window_rad, _ASKEW_rad):
             for side in SIDES:
-                places = self._on_side(storeys, yaw_rad, side)
+                places = self._on_side(storeys, share, yaw_rad, side)
                 yield from self._going_on([one for one in places if self._is_open(one)])
 
-    def _on_side(self, storeys: Storeys, yaw_rad: float, side: str) -> Iterator[StandingCandidate]:
-        """Touches by a hand that comes from one side, in lanes beside one another, one above the other."""
+    def _on_side(self, storeys: Storeys, share: float, yaw_rad: float, side: str) -> Iterator[StandingCandidate]:
+        """Touches by a hand that comes from one side, in lanes up to a share of the half width from the middle."""
         name, lowest_m = sideways(COLUMN.closing, side), lowest_touch_m(side, self.settings.side_heights_m, self.hand)
         box, across = self.felt.standing_box, np.array([np.cos(yaw_rad), np.sin(yaw_rad)])
         way = approach_of(GraspPlan(GraspFrame(0.0, 0.0, yaw_rad), name, lowest_m), self.hand)
         if not self.felt.may_be_pushed(way):
             return
-        foot_m, share = box.foot_along_m(way), _SQUARELY if self.felt.is_round else 1.0
+        foot_m = box.foot_along_m(way)
         up_to_m = min(slides_up_to_m(foot_m), box.size_m[2] - _INSIDE_m)
         low_m, laid_m = (lowest_m + 1e-9, 0.0) if self.felt.is_slender(way) else (np.inf, up_to_m)
         for height_m in np.arange(lowest_m, max(box.size_m[2] - _INSIDE_m, lowest_m + 1e-9), _HEIGHTS_APART_m).tolist():
