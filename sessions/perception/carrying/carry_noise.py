@@ -27,7 +27,7 @@ UNPUSHED = LinkTimes()
 @dataclass(frozen=True)
 class CarryNoise:
     """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83,
-    121, 144).
+    121, 144, 153).
 
     Attributes:
         least_m, least_rad: of any carry.
@@ -35,6 +35,7 @@ class CarryNoise:
         slip_m: share of the slip itself.
         turned_m, turned_rad: of the turn by which it slipped, per radian, and of its square: contacts that slide far
             are not where the balance has them.
+        missing_rad: share of the turn by which it slipped, for each fingertip of five that did not hold it.
         round_rad: share of the hand's turn that a round object may be off by, over the fingertips beyond two.
         roll_m: how far an object whose sides lean rolls or rocks when it is let go and grasped, over the sine.
         let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
@@ -55,9 +56,10 @@ class CarryNoise:
     slip_m: float = 0.024
     turned_m: float = 0.0017
     turned_rad: float = 0.8
+    missing_rad: float = 0.15
     round_rad: float = 0.07
-    roll_m: float = 0.0031
-    let_go_m_N: float = 0.00008
+    roll_m: float = 0.0035
+    let_go_m_N: float = 0.00007
     let_go_rad_N: float = float(np.deg2rad(0.05))
     pushed_m_N: float = 0.001
     pushed_rad_N: float = float(np.deg2rad(0.5))
