@@ -7,8 +7,7 @@ import numpy as np
 from drivers.core.contact_checks import touched_one_side
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.slam.doubt.known_part import LARGEST_SIGMA_m
-
-_WORTH_A_WARNING = 0.1
+from tactile_lab.slam.doubt.status import LEAST_KNOWN_SHARE
 
 
 def result_warnings(results: Results) -> tuple[str, ...]:
@@ -40,5 +39,5 @@ def _warn_of_guesses(results: Results) -> str:
     if (sigma_m := results.sigma_quantiles_m) is None:
         return ""
     known = results.known_share
-    share = float(np.mean(sigma_m > LARGEST_SIGMA_m)) if known is None else 1.0 - known
-    return f"{share:.0%} of the shape is a guess: nothing was touched near it" if share > _WORTH_A_WARNING else ""
+    share = float(np.mean(sigma_m <= LARGEST_SIGMA_m)) if known is None else known
+    return f"{1 - share:.0%} of the shape is a guess: nothing was touched near it" if share < LEAST_KNOWN_SHARE else ""

@@ -122,9 +122,9 @@ def tip_over(plant: Plant, cycle: int) -> None:
     [
         (lose, "box-10x6x4", SEED, "touched by no fingertip for"),
         (leave_to_the_thumb, "box-10x6x4", SEED, "held by one fingertip for"),
-        (leave_to_the_first_finger, "l-block", 9, "held by one fingertip for"),
+        pytest.param(leave_to_the_first_finger, "l-block", 9, "held by one fingertip for", marks=pytest.mark.long),
         (fix_to_the_table, "box-10x6x4", SEED, "is it jammed, or held by something?"),
-        (jam, "hexagonal-prism", 8, "is it jammed, or held by something?"),
+        pytest.param(jam, "hexagonal-prism", 8, "is it jammed, or held by something?", marks=pytest.mark.long),
         (tip_over, "cube-6", SEED, "has it fallen over?"),
     ],
 )

@@ -24,7 +24,8 @@ def test_a_link_that_fails_ends_the_session_in_order_and_its_recording_is_whole(
     assert swept.replay.startswith("read")
 
 
-@pytest.mark.parametrize("name", ["sensor at 0", pytest.param("all motors silent", marks=pytest.mark.long)])
+@pytest.mark.long  # quicker: a link that fails, above
+@pytest.mark.parametrize("name", ["sensor at 0", "all motors silent"])
 def test_a_fault_of_the_hand_takes_its_demands_and_ends_the_session_by_name(tmp_path, name):
     """All of them: ``python -m tests.support.session_hand_fault_table``."""
     fault = FAULTS[name]

@@ -64,6 +64,7 @@ def test_the_hand_comes_down_over_a_cube_of_6_cm_as_far_as_its_links_are_clear(h
     assert all(np.linalg.norm(place[:2]) < 0.001 for place in cycle.landings_world_m)
 
 
+@pytest.mark.long  # quicker: how far the hand comes down over a cube, above
 def test_a_grasp_whose_links_land_is_done_higher_where_nobody_has_felt_how_tall_the_object_is() -> None:
     first, second = record("hexagonal-prism", 61, 3, 2).grasps
     assert min(len(first.touching), len(second.touching)) >= 3

@@ -126,6 +126,7 @@ def test_ctrl_c_while_the_result_is_judged_keeps_the_session(program, tmp_path, 
     assert (shown["counts"]["grasps"], shown["data_loss"]) == (1, {})
 
 
+@pytest.mark.long  # quicker: test_recorder_accidents
 def test_a_full_disk_ends_the_session_and_the_recorded_part_replays(tmp_path, inside, monkeypatch):
     rig, room, write = low_rig(tmp_path.parent), [900_000], os.write
 

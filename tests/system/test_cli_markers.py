@@ -74,7 +74,7 @@ def test_the_rigs_markers_are_printed_with_the_true_scale(inside: Any, tmp_path:
     assert ("id 0  50 mm  on the table" in printed, "id 7  35 mm  under the object" in printed) == (True, True)
 
 
-@pytest.mark.parametrize("answer_mm", ["99,8", ""])
+@pytest.mark.parametrize("answer_mm", [pytest.param("99,8", marks=pytest.mark.long), ""])
 def test_a_person_is_asked_for_the_bar_and_may_answer_later(
     program: WarmProgram, tmp_path: Path, answer_mm: str
 ) -> None:

@@ -51,6 +51,7 @@ def test_own_contacts_become_a_shape_in_fifteen_lines() -> None:
     assert len([line for line in code.splitlines() if line]) <= 15
 
 
+@pytest.mark.long  # quicker: own contacts become a shape
 def test_a_recorded_session_through_three_methods(
     recorded_root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def test_plugins_are_listed_with_version_and_file(package: Path) -> None:
     assert "other-laboratory 1.2.0" in " ".join(tactile_lab("plugins").output.split())
 
 
+@pytest.mark.long  # quicker: plugins are listed
 def test_a_session_uses_them_and_says_so_in_its_record(package: Path, tmp_path: Path) -> None:
     rig, runs = low_rig(tmp_path, rig_keys("six_floats.py"), rig_keys("text_positioner.py")), tmp_path / "runs"
     keys = yaml.safe_load(rig.read_text())

@@ -30,7 +30,7 @@ _CLOSES_m_s = 0.008
 """Fingers that feel nothing go on closing this fast, and may push the object with a link."""
 _USUAL_NET_N, _PUSHED_SHARE = 0.8, 0.9
 """Net force with which objects are dragged over a table, and which quantile of a carry's is compared with it."""
-_FARTHER_THE_LONGER = 1.5
+_FARTHER_THE_LONGER = 1.25
 """Power of the time for which a link pushes: at first it slips along the object."""
 _SLIDES_m_s, _SLIDES_N = 0.010, 0.2
 """A fingertip that moves faster than this along the object, and presses more, counts as sliding."""

@@ -42,7 +42,7 @@ class CarryNoise:
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
         closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
-        links_m, links_rad: where links pushed for a second meanwhile; grows with the power 1.5 of that time.
+        links_m, links_rad: where links pushed for a second meanwhile; grows with the power 1.25 of that time.
         landed_m_s, landed_rad_s: for each second in which links were on the object when the hand came down before.
         stood_m, stood_rad: of an object that was not carried, by touches and closings that should not move it.
         unseen: share of the hand's motion while fewer than two fingertips held the object, one was silent, or the
@@ -50,7 +50,7 @@ class CarryNoise:
     """
 
     least_m: float = 0.000035
-    least_rad: float = float(np.deg2rad(0.18))
+    least_rad: float = float(np.deg2rad(0.17))
     spread_m: float = 0.45
     spread_rad: float = 0.12
     slip_m: float = 0.024
@@ -65,8 +65,8 @@ class CarryNoise:
     pushed_rad_N: float = float(np.deg2rad(0.5))
     closed_m_N: float = 0.003
     closed_rad_N: float = float(np.deg2rad(1.9))
-    links_m: float = 0.0049
-    links_rad: float = float(np.deg2rad(2.0))
+    links_m: float = 0.0043
+    links_rad: float = float(np.deg2rad(3.3))
     landed_m_s: float = 0.005
     landed_rad_s: float = float(np.deg2rad(5.0))
     stood_m: float = 0.00025

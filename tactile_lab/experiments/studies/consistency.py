@@ -24,7 +24,13 @@ from tactile_lab.experiments.data.spatial_data import SpatialGrasps
 from tactile_lab.experiments.experiment import Experiment
 from tactile_lab.experiments.groups import Column
 from tactile_lab.experiments.run_metrics import slam_figures
-from tactile_lab.experiments.studies.columns import POSES_INSIDE, REGISTRATION, SIZES_INSIDE, SURFACE_INSIDE
+from tactile_lab.experiments.studies.columns import (
+    HAUSDORFF,
+    POSES_INSIDE,
+    REGISTRATION,
+    SIZES_INSIDE,
+    SURFACE_INSIDE,
+)
 from tactile_lab.experiments.studies.plots import ranges
 from tactile_lab.slam.result import SlamResult
 from tactile_lab.slam.shape.metrics.alignment import align_contours, align_meshes
@@ -71,8 +77,8 @@ def assessed_run(cell: Cell) -> dict[str, Any]:
         slam.add_grasp(grasp)
     result = slam.finish()
     figures = slam_figures(data, result)
-    registration_mm = figures["registration_mm"]
-    off = registration_mm is None or registration_mm > FAILURE_LIMIT_MM or _far_share(data, result) > _FAR_SHARE
+    far_mm = (figures["registration_mm"], figures["hausdorff_mm"])
+    off = any(mm is None or mm > FAILURE_LIMIT_MM for mm in far_mm) or _far_share(data, result) > _FAR_SHARE
     told = result.status != "complete"
     return {
         **figures,
@@ -145,6 +151,7 @@ CONSISTENCY = Experiment(
     _settings,
     assessed_run,
     (
+        HAUSDORFF,
         REGISTRATION,
         POSES_INSIDE,
         Column("in the common frame", "common_poses_inside", 0, kind="shares"),

@@ -16,7 +16,6 @@ from tactile_lab.slam.doubt.sizes import unknown_sizes
 from tactile_lab.slam.doubt.status import (
     LARGEST_REFUSED_SHARE,
     LEAST_GRASPS,
-    LEAST_KNOWN_SHARE,
     Alternative,
     Doubt,
     Status,
@@ -29,6 +28,9 @@ from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
 from tactile_lab.slam.tracking.joint.joint_tracker import JointTracker
 from tactile_lab.slam.tracking.tracker import Tracker
 from tactile_lab.slam.tracking.trackers import TrackingSettings
+
+_ENOUGH_TO_SEE = 0.8
+"""Known share of a shape whose symmetry counts: turns that no contact could tell."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ def assess(
         if isinstance(shape, SurfaceMesh):
             missing = [*missing_parts(contact_map, shape, floor_m), *doubts_of_top(shape, part.unfelt)]
         shape, share = with_guesses_told(shape, part), part.share
-    symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= LEAST_KNOWN_SHARE else None
+    symmetry = symmetry_of(shape) if shape is not None and share is not None and share >= _ENOUGH_TO_SEE else None
     if has_ended:
         others = _alternatives(tracker, contact_map, settings, shape, symmetry, origin_height_m)
     else:
