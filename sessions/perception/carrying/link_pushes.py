@@ -47,6 +47,7 @@ _PUSH_SAMPLES = 6
 """In a row."""
 _LANDED_COUNTS, _STILL_rad_s = 30.0, 0.15
 """Of a landing; open fingers that come down freely stay within 30 counts."""
+_LOWEST_m = 0.002
 _FIT_SAMPLES, _FITS = 20, 6
 _MEDIAN_TO_SIGMA = 1.48
 
@@ -91,11 +92,15 @@ class LinkPushes:
         return self._time_s((free.off(newest) > free.limits) & newest.usable)
 
     def landed_s(self, samples: CarrySamples) -> float:
-        """How long links were on something while the open hand came down, the fingers' times added."""
-        if samples.motor_counts is None or np.isnan(samples.motor_counts).any():
+        """How long links were on something while the open hand came down, the fingers' times added.
+
+        The way up again does not count, on which the fingers may be arranged otherwise and weigh on other motors.
+        """
+        down = _way_down(samples)
+        if down is None or down.motor_counts is None or np.isnan(down.motor_counts).any():
             return 0.0
-        speeds = _speeds(samples.joints_rad @ self._motors.from_joints.T, samples)
-        counts = _smooth(samples.motor_counts, 2 / 3 * _SMOOTHING)
+        speeds = _speeds(down.joints_rad @ self._motors.from_joints.T, down)
+        counts = _smooth(down.motor_counts, 2 / 3 * _SMOOTHING)
         off = np.abs(counts - np.median(counts, axis=0)) > _LANDED_COUNTS
         return self._time_s(off & (np.abs(speeds) < _STILL_rad_s) & self._watched)
 
@@ -153,6 +158,13 @@ class _FreeMotions:
     def off(self, closing: _Closing) -> Array:
         """By how much the counts are off, shape (n, 20)."""
         return np.asarray(np.abs(closing.counts - np.einsum("nmk,mk->nm", closing.terms, self.coefficients)))
+
+
+def _way_down(samples: CarrySamples) -> CarrySamples | None:
+    """Until the hand leaves the lowest place that it comes to; None for too little."""
+    heights_m = samples.world_T_forearm[:, 2, 3]
+    lowest = np.flatnonzero(heights_m < heights_m.min() + _LOWEST_m)
+    return samples.until(int(samples.stamps_ns[lowest[-1]]))
 
 
 def _runs(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -175,6 +175,15 @@ def test_a_push_widens_the_noise_of_the_step_that_it_ends() -> None:
     assert widened.rotation_rad > 2 * known.rotation_rad
 
 
+def test_what_motors_show_on_the_way_up_again_is_no_landing() -> None:
+    landed = pushing(still(np.random.default_rng(14)), "RFJ3", 60.0, slice(90, 120))
+    places = np.tile(np.eye(4), (COUNT, 1, 1))
+    links = LinkPushes(MOTORS, TIPS, "right")
+    for lowest, seconds in ((60, 0.0), (130, 0.3)):
+        places[:, 2, 3] = 0.2 + 0.0005 * np.abs(np.arange(COUNT) - lowest)
+        assert links.landed_s(replace(landed, world_T_forearm=places)) == pytest.approx(seconds, abs=0.05)
+
+
 def test_landings_of_all_tries_count_until_the_next_descent() -> None:
     chance, known = np.random.default_rng(13), StepSigma(0.0004, np.radians(0.3))
     landed, held = pushing(still(chance), "RFJ3", 60.0, slice(90, 120)), HeldObject(TIPS, "right", 1.0, MOTORS)
