@@ -44,6 +44,7 @@ from sessions.recording.session_events import EventKind, SessionEvent
 
 _PUSHED = StepSigma(0.02, float(np.radians(15.0)))
 """How far an object may have been pushed that was found again, standing as before."""
+_GAVE_WAY = "touched before the object gave way"
 
 
 class PerceptionSettings(StrictModel):
@@ -239,6 +240,7 @@ class Perception:
             case EventKind.CAPTURE_END:
                 return self._grasp(event)
             case EventKind.TOUCH_END:
+                self._probed = self._still_there()
                 self._probed.add(self.touches.end(event))
                 self.held.on_left()
                 self._hearing.on_left()
@@ -293,7 +295,7 @@ class Perception:
             self._hearing.on_still()
 
     def _grasp(self, event: SessionEvent) -> Grasp:
-        measured, probed = self.touches.end(event), self._probed
+        measured, probed = self.touches.end(event), self._still_there()
         self._probed = Probed()
         felt = self.held.end_hold(measured.stamp_ns) if self.is_holding else None
         index, motion = self.grasp_count, self._carried.take(self.hand.world_T_palm, felt)
@@ -309,6 +311,13 @@ class Perception:
             motion_sigma=self._motion_sigma(index, motion),
             begins_anew=index in self._unheld[EventKind.OBJECT_FELL],
         )
+
+    def _still_there(self) -> Probed:
+        """What was touched before for the next grasp; nothing where the object has given way since, and is counted."""
+        if not self.held.given_way_m or not self._probed.contacts:
+            return self._probed
+        self.touches.drop_counts[_GAVE_WAY] += len(self._probed.contacts)
+        return Probed()
 
     def _motion_sigma(self, index: int, motion: HandMotion) -> StepSigma | None:
         if index in self._unheld[EventKind.OBJECT_MOVED]:

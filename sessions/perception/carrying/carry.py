@@ -133,19 +133,24 @@ class CarryOdometry:
         """How far an object may have moved that stood while it was touched."""
         return StepSigma(self._scale * self.noise.stood_m, self._scale * self.noise.stood_rad)
 
-    def closed(self, sigma: StepSigma, closing_N: float, links: LinkTimes = UNPUSHED) -> StepSigma:
+    def closed(
+        self, sigma: StepSigma, closing_N: float, links: LinkTimes = UNPUSHED, given_way_m: float = 0.0
+    ) -> StepSigma:
         """How well the object's place is known once the hand has closed again.
 
         Args:
             sigma: before.
             closing_N: largest net force of the fingertips meanwhile.
             links: how long links pushed.
+            given_way_m: how far the object moved under a fingertip; it may have turned about anything within its
+                width.
         """
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
         pushed = links.pushed_s**_FARTHER_THE_LONGER
         causes = self._scale * np.array([excess_N, pushed, links.landed_s])
-        translation_m = np.linalg.norm([sigma.translation_m, *causes * noise.after_m])
-        rotation_rad = np.linalg.norm([sigma.rotation_rad, *causes * noise.after_rad])
+        turned_rad = given_way_m / self.friction.half_width_m
+        translation_m = np.linalg.norm([sigma.translation_m, given_way_m, *causes * noise.after_m])
+        rotation_rad = np.linalg.norm([sigma.rotation_rad, turned_rad, *causes * noise.after_rad])
         return StepSigma(float(translation_m), float(rotation_rad))
 
     def estimate(self, samples: CarrySamples) -> Carry:

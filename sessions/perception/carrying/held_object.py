@@ -14,9 +14,11 @@ from sessions.perception.carrying.carry import Carry, CarryOdometry
 from sessions.perception.carrying.carry_noise import LinkTimes
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.force_delay import ForceDelay
+from sessions.perception.carrying.given_way import given_way_m
 from sessions.perception.carrying.link_pushes import LinkPushes
 from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.carrying.slip import Slip, slip
+from sessions.perception.carrying.tip_steps import tip_steps
 from sessions.perception.touch_capture import Measured
 
 
@@ -59,6 +61,8 @@ class HeldObject:
         What they feel balances itself, but for what moves the object, and for links on its other side.
         """
 
+        self.given_way_m, self._moved_m = 0.0, 0.0
+        """How far the object moved under the fingertips of the last closing, and most since the last grasp."""
         self.contact_height_m = 0.0
         """Mean height of the last capture's contacts above the table."""
         self.carry: Carry | None = None
@@ -88,7 +92,7 @@ class HeldObject:
         self._come_down(stamp_ns)
         self._record.end()
         if self._is_grasped:
-            self.landed_s, self._is_grasped = 0.0, False
+            self.landed_s, self._moved_m, self._is_grasped = 0.0, 0.0, False
         if self._links is not None:
             self._tared_ns = stamp_ns
             self._descent.begin()
@@ -112,6 +116,9 @@ class HeldObject:
         closing = self._record.since(self._from_ns) if self._record.is_open else None
         self.closing_N = 0.0 if closing is None else largest_net_N(closing, self.fingertips, self._side)
         self.pushed_s = 0.0 if closing is None or self._links is None else self._links.pushed_s(closing)
+        steps = None if closing is None else tip_steps(closing, self.fingertips, self._side)
+        self.given_way_m = 0.0 if steps is None else given_way_m(steps)
+        self._moved_m = max(self._moved_m, self.given_way_m)
         if closing is not None:
             self.delay.on_closing(closing)
         self._from_ns = stamp_ns
@@ -159,7 +166,7 @@ class HeldObject:
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
         pushes = LinkTimes(self.pushed_s, self.landed_s)
-        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, pushes)
+        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, pushes, self._moved_m)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
         """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""

@@ -60,6 +60,7 @@ class StandingCandidate:
         score_m: what it would tell, less what it costs.
         depth_m: of a grasp from the side, behind the object's front.
         further_m: where else contacts are expected as the hand touches on, shape (n, 3), world.
+        on_top: whether they are on the top, not on sides.
     """
 
     plan: GraspPlan
@@ -67,6 +68,7 @@ class StandingCandidate:
     score_m: float
     depth_m: float = 0.0
     further_m: Array = field(default_factory=lambda: np.empty((0, 3)))
+    on_top: bool = False
 
     @property
     def touches_m(self) -> Array:

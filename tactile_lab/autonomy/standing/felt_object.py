@@ -36,8 +36,8 @@ _SLENDER = 0.2
 _UNSTEADY = 0.15
 """So much more slender, it leans in a grasp: thumb and fingers press at different heights."""
 
-_UPWARD = 0.7
-"""Least vertical part of the normal of a contact on the top."""
+_UPWARD, _NO_SIDE = 0.7, 0.3
+"""Least vertical part of the normal of a contact on the top, and the largest of one on a side; an edge is both."""
 
 _SURELY_m = 0.015
 """Contacts are few: an object is wider than the box around them."""
@@ -59,7 +59,9 @@ class FeltObject:
     grasps: int = 0
     _points_m: list[Array] = field(default_factory=list)
     _normals: list[Array] = field(default_factory=list)
-    _looked_m: list[Array] = field(default_factory=list)
+    _looked_m: dict[bool, list[Array]] = field(default_factory=lambda: {True: [], False: []})
+    """Places on the top, and on sides."""
+
     _open_m: list[Array] = field(default_factory=list)
     _passed_m: list[Array] = field(default_factory=list)
     _pushed: Array | None = None
@@ -140,15 +142,15 @@ class FeltObject:
         self._points_m, self._normals, self._moved = [], [], self._first.move(motion)
         self.add(points_m, normals)
 
-    def on_looked(self, places_m: Array) -> None:
-        """Contacts were expected at these places, (n, 3), world: found there, elsewhere or nowhere, they are no longer
-        new.
+    def on_looked(self, places_m: Array, *, on_top: bool = False) -> None:
+        """Contacts were expected at these places of the top or of sides, (n, 3), world: found there, elsewhere or
+        nowhere, they are no longer new.
         """
-        self._looked_m += list(places_m)
+        self._looked_m[on_top] += list(places_m)
 
     def look_again(self) -> None:
         """Places where contacts were expected and found elsewhere, or nowhere, are new again."""
-        self._looked_m = []
+        self._looked_m = {True: [], False: []}
 
     def on_pushed(self, way: Array) -> None:
         """It was touched from one side alone along a horizontal unit vector, world, shape (2,)."""
@@ -207,9 +209,13 @@ class FeltObject:
         yaws = [theta + quarter * np.pi / 2 + aside for quarter in range(-3, 4) for aside in asides]
         return [float(np.clip(yaw, low, high)) for yaw in yaws if low - askew_rad <= yaw <= high + askew_rad]
 
-    def distances_m(self, places_m: Array) -> Array:
-        """Of places (n, 3) to the nearest where a contact was, or was expected before, shape (n,), at most 40 mm."""
-        return np.minimum(self._apart_m(places_m, [*self._points_m, *self._looked_m]), _FAR_m)
+    def distances_m(self, places_m: Array, *, on_top: bool = False) -> Array:
+        """Of places (n, 3) of the top or of sides to the nearest where a contact was that faces so, or was expected
+        before, shape (n,), at most 40 mm. What lies below an edge is not known from above it.
+        """
+        points_m, normals = self._contacts()
+        facing = normals[:, 2] > _NO_SIDE if on_top else normals[:, 2] < _UPWARD
+        return np.minimum(self._apart_m(places_m, [*points_m[facing], *self._looked_m[on_top]]), _FAR_m)
 
     @staticmethod
     def _apart_m(places_m: Array, others_m: Sequence[Array]) -> Array:
@@ -243,13 +249,13 @@ class FeltObject:
         """Whether a touch along ``way`` leans it no farther than the last one has; see :meth:`on_pushed`."""
         return not self.is_slender(way) or self._pushed is None or float(way @ self._pushed) < 0
 
-    def novelty_m(self, places_m: Array) -> float:
+    def novelty_m(self, places_m: Array, *, on_top: bool = False) -> float:
         """How new contacts at places (n, 3) would be: the sum of their distances to what is known."""
-        return float(self.distances_m(places_m).sum())
+        return float(self.distances_m(places_m, on_top=on_top).sum())
 
-    def is_new(self, places_m: Array) -> bool:
+    def is_new(self, places_m: Array, *, on_top: bool = False) -> bool:
         """Whether any of the places (n, 3) is not known yet."""
-        return bool(self.distances_m(places_m).max() > _NEAR_m)
+        return bool(self.distances_m(places_m, on_top=on_top).max() > _NEAR_m)
 
     def is_unknown(self, places_m: Array) -> bool:
         """Whether places (n, 3) are on average far from all that is known."""

@@ -114,7 +114,7 @@ class StandingPlanner:
             return
         self._touches += done.plan.only_touch
         self.whereabouts.on_grasp(grasp, done, approach_of(done.plan, self.hand))
-        self.felt.on_looked(done.touches_m)
+        self.felt.on_looked(done.touches_m, on_top=done.on_top)
         if done.plan.only_touch and done.plan.places:
             self.felt.on_pushed(approach_of(done.plan, self.hand))
             self.felt.on_passed(grasp.approach_paths)

@@ -65,7 +65,7 @@ class TouchPlanner(ActionPlanner):
 
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
-        new = (one for one in (*self._taps(), *self._sides()) if self.felt.is_new(one.touches_m))
+        new = (one for one in (*self._taps(), *self._sides()) if self.felt.is_new(one.touches_m, on_top=one.on_top))
         return max((one for one in new if self._is_open(one)), key=lambda one: one.score_m, default=None)
 
     def _is_open(self, one: StandingCandidate) -> bool:
@@ -81,10 +81,12 @@ class TouchPlanner(ActionPlanner):
         )
 
     def _candidate(
-        self, frame: GraspFrame, name: str, height_m: float, touches: dict[str, Array], what: str
+        self, frame: GraspFrame, name: str, height_m: float, touches: dict[str, Array], *, on_top: bool
     ) -> StandingCandidate:
+        what = "tap on the top" if on_top else "one side touched"
         plan = GraspPlan(frame, name, height_m, f"{what}: {len(touches)} contacts expected", only_touch=True)
-        return StandingCandidate(plan, touches, self.felt.novelty_m(np.array(list(touches.values()))))
+        novelty_m = self.felt.novelty_m(np.array(list(touches.values())), on_top=on_top)
+        return StandingCandidate(plan, touches, novelty_m, on_top=on_top)
 
     # --- from above ----------------------------------------------------------------------------------------------
 
@@ -99,7 +101,7 @@ class TouchPlanner(ActionPlanner):
                 for yaw_rad in yaws_rad:
                     frame = GraspFrame(*_at(box, along_m, across_m), float(yaw_rad))
                     if touches := self._tapped(frame, tips_m, box, is_round):
-                        yield self._candidate(frame, TAP.closing, TAP_HEIGHT_m, touches, "tap on the top")
+                        yield self._candidate(frame, TAP.closing, TAP_HEIGHT_m, touches, on_top=True)
 
     def _tapped(
         self, frame: GraspFrame, tips_m: Mapping[str, Array], box: StandingBox, is_round: bool
@@ -157,7 +159,7 @@ class TouchPlanner(ActionPlanner):
         """A touch at a place on a side by a closing of that name."""
         front_m = np.array([place.frame.x_m, place.frame.y_m])
         touches = _touched(front_m, place.height_m, place.up_to_m, self.hand.form.long_fingers)
-        one = self._candidate(place.frame, name, place.height_m, touches, "one side touched")
+        one = self._candidate(place.frame, name, place.height_m, touches, on_top=False)
         return replace(one, plan=replace(one.plan, places=(place,)))
 
     def _hardly_leans(self, height_m: float, foot_m: float) -> bool:

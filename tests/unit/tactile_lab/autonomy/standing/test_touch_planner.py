@@ -47,7 +47,7 @@ def carry_out(touches: TouchPlanner, most: int = 80) -> list[StandingCandidate]:
     """All touches until there is none, each of which meets what it expects."""
     done = []
     while (best := touches.best()) is not None and len(done) < most:
-        touches.felt.on_looked(best.touches_m)
+        touches.felt.on_looked(best.touches_m, on_top=best.on_top)
         done.append(best)
     return done
 
