@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from gtsam import Pose2
 from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
 
 from drivers.core.contacts import ApproachPath, Array, Grasp
 from sessions.conductor.object_gone import OPENING_m
@@ -220,13 +221,14 @@ class FeltObject:
     @staticmethod
     def _apart_m(places_m: Array, others_m: Sequence[Array]) -> Array:
         """Of places (n, 3) to the nearest of others, (3,) each, shape (n,); infinite where there is none."""
-        apart_m = places_m[:, None] - np.array(others_m).reshape(1, -1, 3)
-        return np.asarray(np.linalg.norm(apart_m, axis=-1).min(axis=1, initial=np.inf))
+        if len(others_m) == 0:
+            return np.full(len(places_m), np.inf)
+        return np.asarray(cdist(places_m, np.reshape(others_m, (-1, 3))).min(axis=1))
 
-    def is_open(self, place_m: Array) -> bool:
-        """Whether a tap has met nothing near a place of the top, shape (3,), and nearer than any contact is."""
-        missed_m, met_m = (float(self._apart_m(place_m[None], some)[0]) for some in (self._open_m, self._points_m))
-        return missed_m < min(_OPEN_m[1], met_m)
+    def are_open(self, places_m: Array) -> NDArray[np.bool_]:
+        """Whether a tap has met nothing near places of the top, (n, 3), and nearer than any contact is, shape (n,)."""
+        missed_m, met_m = (self._apart_m(places_m, some) for some in (self._open_m, self._points_m))
+        return missed_m < np.minimum(_OPEN_m[1], met_m)
 
     def passed_m(self, place_m: Array, way: Array) -> float:
         """How far beyond a place of a side, shape (3,), fingertips went along a horizontal unit vector, shape (2,), at
@@ -253,9 +255,9 @@ class FeltObject:
         """How new contacts at places (n, 3) would be: the sum of their distances to what is known."""
         return float(self.distances_m(places_m, on_top=on_top).sum())
 
-    def is_new(self, places_m: Array, *, on_top: bool = False) -> bool:
-        """Whether any of the places (n, 3) is not known yet."""
-        return bool(self.distances_m(places_m, on_top=on_top).max() > _NEAR_m)
+    def are_new(self, places_m: Array, *, on_top: bool = False) -> NDArray[np.bool_]:
+        """Which of the places (n, 3) are not known yet, shape (n,)."""
+        return self.distances_m(places_m, on_top=on_top) > _NEAR_m
 
     def is_unknown(self, places_m: Array) -> bool:
         """Whether places (n, 3) are on average far from all that is known."""

@@ -41,7 +41,7 @@ class RimPlanner(ActionPlanner):
         if len(self.blocked) >= _TRIES or size_m[2] > _HIGHEST_m or not self._is_wide:
             return None
         tried = [one.plan.frame.yaw_rad for one in self.blocked]
-        new = (one for one in self._candidates() if self.felt.is_new(one.touches_m))
+        new = (one for one in self._candidates() if self.felt.are_new(one.touches_m).any())
         rated = [one for one in new if all(abs(one.plan.frame.yaw_rad - yaw) > _YAWS_APART_rad / 2 for yaw in tried)]
         return max(rated, key=lambda one: one.score_m, default=None)
 

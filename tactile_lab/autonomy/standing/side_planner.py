@@ -64,7 +64,7 @@ class SidePlanner(ActionPlanner):
 
     def best(self) -> StandingCandidate | None:
         """The next grasp; None where nothing is left that would tell anything new."""
-        rated = [one for one in self._candidates() if self.felt.is_new(one.touches_m)]
+        rated = [one for one in self._candidates() if self.felt.are_new(one.touches_m).any()]
         if not rated:
             return None
         best = max(rated, key=lambda one: one.score_m)

@@ -7,10 +7,11 @@ would rather slide than tip.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, closing, sideways
@@ -65,8 +66,10 @@ class TouchPlanner(ActionPlanner):
 
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
-        new = (one for one in (*self._taps(), *self._sides()) if self.felt.is_new(one.touches_m, on_top=one.on_top))
-        return max((one for one in new if self._is_open(one)), key=lambda one: one.score_m, default=None)
+        sides = (one for one in self._sides() if self.felt.are_new(one.touches_m).any())
+        return max(
+            (one for one in (*self._taps(), *sides) if self._is_open(one)), key=lambda one: one.score_m, default=None
+        )
 
     def _is_open(self, one: StandingCandidate) -> bool:
         return not self._was_blocked(one.plan) and self.reach.holds(one.plan, self.hand)
@@ -92,31 +95,40 @@ class TouchPlanner(ActionPlanner):
 
     def _taps(self) -> Iterator[StandingCandidate]:
         """Side by side over the top, turned so that no finger comes down on an edge."""
-        box, is_round, (low, high) = self.felt.storeys.boxes[-1], self.felt.is_round, self.yaw_window_rad
-        yaws_rad = [yaw for yaw in (low + high) / 2 + _TAP_TURNS_rad if low <= yaw <= high]
-        table = closing(TAP.closing, TAP_HEIGHT_m, self.hand)
-        tips_m = {finger: table.path(finger).centre_m(TAP.progress[finger]) for finger in table.fingers}
-        for along_m in _places(box.size_m[0] / 2, _TAPS_APART_m):
-            for across_m in _places(box.size_m[1] / 2, _TAPS_APART_m):
-                for yaw_rad in yaws_rad:
-                    frame = GraspFrame(*_at(box, along_m, across_m), float(yaw_rad))
-                    if touches := self._tapped(frame, tips_m, box, is_round):
-                        yield self._candidate(frame, TAP.closing, TAP_HEIGHT_m, touches, on_top=True)
+        box, (low, high) = self.felt.storeys.boxes[-1], self.yaw_window_rad
+        yaws_rad = [float(yaw) for yaw in (low + high) / 2 + _TAP_TURNS_rad if low <= yaw <= high]
+        middles = [
+            _at(box, along_m, across_m)
+            for along_m in _places(box.size_m[0] / 2, _TAPS_APART_m)
+            for across_m in _places(box.size_m[1] / 2, _TAPS_APART_m)
+        ]
+        frames = [GraspFrame(*middle, yaw_rad) for middle in middles for yaw_rad in yaws_rad]
+        fingers, tips_m = self._tapping_tips()
+        places_m = np.array([frame.pose.matrix()[:3, :3] @ tips_m for frame in frames]).swapaxes(1, 2)
+        places_m[..., :2] += np.array([[frame.x_m, frame.y_m] for frame in frames])[:, None]
+        places_m[..., 2] = box.size_m[2]
+        met = self._met(box, places_m)
+        new = self.felt.are_new(places_m.reshape(-1, 3), on_top=True).reshape(met.shape)
+        for row in np.flatnonzero((met & new).any(axis=1)):
+            tips = zip(fingers, places_m[row], met[row], strict=True)
+            touches = {finger: place for finger, place, is_met in tips if is_met}
+            yield self._candidate(frames[row], TAP.closing, TAP_HEIGHT_m, touches, on_top=True)
 
-    def _tapped(
-        self, frame: GraspFrame, tips_m: Mapping[str, Array], box: StandingBox, is_round: bool
-    ) -> dict[str, Array]:
-        """Where fingertips, in the grasp frame, meet the top; nothing where one would come down on an edge, and lean a
-        link.
+    def _tapping_tips(self) -> tuple[Sequence[str], Array]:
+        """The fingers of a tap, and where their tips are in the grasp frame, shape (3, fingers)."""
+        table = closing(TAP.closing, TAP_HEIGHT_m, self.hand)
+        return table.fingers, np.array([table.path(f).centre_m(TAP.progress[f]) for f in table.fingers]).T
+
+    def _met(self, box: StandingBox, places_m: Array) -> NDArray[np.bool_]:
+        """Which fingertips at places (n, fingers, 3) meet the top, shape (n, fingers); none of a tap of which one would
+        come down on an edge, and lean a link.
         """
-        places_m = np.array([frame.pose.transformFrom(tip_m) for tip_m in tips_m.values()])
-        places_m[:, 2] = box.size_m[2]
-        outside_m = (box.outside_circle_m if is_round else box.outside_m)(places_m[:, :2])
+        flat_m = places_m.reshape(-1, 3)
+        outside_m = (box.outside_circle_m if self.felt.is_round else box.outside_m)(flat_m[:, :2])
         meets = outside_m < -_INSIDE_m / 2
-        if (outside_m[~meets] < self.hand.radius_m + _BESIDE_m).any():
-            return {}
-        met = zip(tips_m, places_m, meets, strict=True)
-        return {finger: place for finger, place, is_met in met if is_met and not self.felt.is_open(place)}
+        on_edge = ~meets & (outside_m < self.hand.radius_m + _BESIDE_m)
+        met, shape = meets & ~self.felt.are_open(flat_m), places_m.shape[:2]
+        return np.asarray(met.reshape(shape) & ~on_edge.reshape(shape).any(axis=1, keepdims=True))
 
     # --- from the side -------------------------------------------------------------------------------------------
 

@@ -148,8 +148,8 @@ def test_where_a_tap_met_nothing_the_top_is_open_and_no_fingertip_is_expected_th
     met, missed = np.array([[0.06, 0.0, 0.05]]), np.array([[0.01, 0.0, 0.05]])
     known.add(met, np.array([[0.0, 0.0, 1.0]]))
     known.on_missed_top(np.vstack([met + 0.005, missed]))
-    assert known.is_open(np.array([0.02, 0.0, 0.05]))
-    assert not any(known.is_open(np.array([x_m, 0.0, 0.05])) for x_m in (0.045, 0.06, -0.03))
+    open_ = known.are_open(np.array([[x_m, 0.0, 0.05] for x_m in (0.02, 0.045, 0.06, -0.03)]))
+    assert open_.tolist() == [True, False, False, False]
     on_top = [one for one in planner(known)._taps() if one.touches]
     apart_m = np.linalg.norm(np.vstack([one.touches_m for one in on_top]) - missed, axis=1)
     assert on_top
