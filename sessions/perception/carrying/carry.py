@@ -148,8 +148,9 @@ class CarryOdometry:
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
         pushed = links.pushed_s**_FARTHER_THE_LONGER
         causes = self._scale * np.array([excess_N, pushed, links.landed_s])
-        turned_rad = given_way_m / self.friction.half_width_m
-        translation_m = np.linalg.norm([sigma.translation_m, given_way_m, *causes * noise.after_m])
+        moved_m = self._scale * given_way_m
+        turned_rad = moved_m / self.friction.half_width_m
+        translation_m = np.linalg.norm([sigma.translation_m, moved_m, *causes * noise.after_m])
         rotation_rad = np.linalg.norm([sigma.rotation_rad, turned_rad, *causes * noise.after_rad])
         return StepSigma(float(translation_m), float(rotation_rad))
 
