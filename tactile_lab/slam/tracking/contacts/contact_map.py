@@ -23,7 +23,7 @@ _WHATEVER_THE_POSES = ("contacts_world", "grasp_indices", "_free_world")
 _WRONG_BY_m = 0.018
 """Farther than this before a contact that is left out, its finger was on its way, however wrong the contact is."""
 
-_UPWARD, _SAME_TOP_m, _ABOVE_m = 0.7, 0.010, 0.003
+_UPWARD, _SAME_TOP_m, _ABOVE_m = 0.5, 0.010, 0.003
 """A fingertip laid on with a normal that rises so has looked for the top; it was there if nothing was met so far above
 it; and so far over the highest contact the object surely ends, whatever a contact is off.
 """
