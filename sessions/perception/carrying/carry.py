@@ -220,7 +220,7 @@ class CarryOdometry:
         ]
         parts_rad = [
             while_held_rad,
-            noise.missing_rad * turned_rad * _missing(steps),
+            noise.missing_rad * turned_rad * (len(FINGERS) - _holding(steps)),
             noise.round_rad * float(held.turns @ steps.palm_turns_rad),
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
@@ -232,12 +232,12 @@ class CarryOdometry:
 
     def _off_centre_m(self, steps: TipSteps) -> float:
         """How far the object's middle is from that of its contacts, about which it turns: far for few contacts."""
-        return self.friction.half_width_m / max(float(steps.felt.sum(axis=1).mean()), 1.0)
+        return self.friction.half_width_m / max(_holding(steps), 1.0)
 
 
-def _missing(steps: TipSteps) -> float:
-    """How many of the five fingertips did not hold the object, in the mean: each that does checks its turn."""
-    return len(FINGERS) - float(steps.felt.sum(axis=1).mean())
+def _holding(steps: TipSteps) -> float:
+    """How many fingertips held the object, in the mean."""
+    return float(steps.felt.sum(axis=1).mean())
 
 
 def _other_assumptions(usual: Friction, measured: MeasuredFriction) -> Sequence[Friction]:

@@ -114,15 +114,20 @@ class HeldObject:
     def on_capture(self, stamp_ns: int) -> None:
         """The fingers have closed and rest: whatever moves the object from now on counts."""
         closing = self._record.since(self._from_ns) if self._record.is_open else None
-        self.closing_N = 0.0 if closing is None else largest_net_N(closing, self.fingertips, self._side)
-        self.pushed_s = 0.0 if closing is None or self._links is None else self._links.pushed_s(closing)
-        steps = None if closing is None else tip_steps(closing, self.fingertips, self._side)
-        self.given_way_m = 0.0 if steps is None else given_way_m(steps)
-        self._moved_m = max(self._moved_m, self.given_way_m)
+        self.closing_N, self.pushed_s, self.given_way_m = 0.0, 0.0, 0.0
         if closing is not None:
-            self.delay.on_closing(closing)
+            self._take_closing(closing)
         self._from_ns = stamp_ns
         self._record.begin()
+
+    def _take_closing(self, closing: CarrySamples) -> None:
+        """What pushed the object while the hand closed, and how far."""
+        self.closing_N = largest_net_N(closing, self.fingertips, self._side)
+        if self._links is not None:
+            self.pushed_s = self._links.pushed_s(closing)
+        self.given_way_m = given_way_m(tip_steps(closing, self.fingertips, self._side))
+        self._moved_m = max(self._moved_m, self.given_way_m)
+        self.delay.on_closing(closing)
 
     def on_grasp(self, measured: Measured) -> None:
         """The capture's contacts; the object was where they say in the middle of the capture."""

@@ -48,6 +48,7 @@ _PUSH_SAMPLES = 6
 _LANDED_COUNTS, _STILL_rad_s = 30.0, 0.15
 """Of a landing; open fingers that come down freely stay within 30 counts."""
 _LOWEST_m = 0.002
+"""The hand is as low as it comes, up to here above the lowest place."""
 _FIT_SAMPLES, _FITS = 20, 6
 _MEDIAN_TO_SIGMA = 1.48
 

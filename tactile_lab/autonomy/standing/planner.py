@@ -15,7 +15,6 @@ from drivers.shadow.closing.closing import closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
-from sessions.motion.probing.touch_patterns import TAP
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
 from tactile_lab.autonomy.standing.rim_planner import RimPlanner
@@ -118,7 +117,7 @@ class StandingPlanner:
         if done.plan.only_touch and done.plan.places:
             self.felt.on_pushed(approach_of(done.plan, self.hand))
             self.felt.on_passed(grasp.approach_paths)
-        if done.plan.only_touch and done.plan.closing == TAP.closing:
+        if done.on_top:
             self.felt.on_missed_top(done.touches_m)
 
     def on_estimate(self, is_placed: bool, points_m: Array, normals: Array, motion: Pose2) -> None:

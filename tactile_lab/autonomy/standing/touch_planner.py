@@ -67,9 +67,8 @@ class TouchPlanner(ActionPlanner):
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
         sides = (one for one in self._sides() if self.felt.are_new(one.touches_m).any())
-        return max(
-            (one for one in (*self._taps(), *sides) if self._is_open(one)), key=lambda one: one.score_m, default=None
-        )
+        offers = (one for one in (*self._taps(), *sides) if self._is_open(one))
+        return max(offers, key=lambda one: one.score_m, default=None)
 
     def _is_open(self, one: StandingCandidate) -> bool:
         return not self._was_blocked(one.plan) and self.reach.holds(one.plan, self.hand)
