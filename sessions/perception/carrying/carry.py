@@ -207,32 +207,32 @@ class CarryOdometry:
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
         noise, held = self.noise, Roundness.of(steps, balance)
         far_m, far_rad, turned_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2], abs(slip[2])
-        slipped_m = noise.slip_m * np.hypot(*slip[:2]) + noise.turned_m * turned_rad
-        while_held_m = noise.least_m + noise.spread_m * far_m + slipped_m
+        slipped_m, missing = float(np.hypot(*slip[:2])), len(FINGERS) - _holding(steps)
+        while_held_m = noise.least_m + noise.spread_m * far_m + noise.slip_m * slipped_m
         while_held_rad = noise.least_rad + noise.spread_rad * far_rad + noise.turned_rad * turned_rad**2
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
         parts_m = [
             while_held_m,
-            noise.roll_m * held.lean,
-            noise.let_go_m_N * pressed_N,
+            noise.missing_m * slipped_m * missing,
+            noise.roll_m * held.overhang,
             noise.pushed_m_N * pushed_N,
             noise.unseen * unseen[0],
         ]
         parts_rad = [
             while_held_rad,
-            noise.missing_rad * turned_rad * (len(FINGERS) - _holding(steps)),
+            noise.missing_rad * turned_rad * missing,
             noise.round_rad * float(held.turns @ steps.palm_turns_rad),
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],
         ]
         rotation_rad = float(np.linalg.norm(parts_rad))
-        translation_m = float(np.linalg.norm([*parts_m, self._off_centre_m(steps) * rotation_rad]))
+        translation_m = float(np.linalg.norm([*parts_m, self._aside_m(missing) * rotation_rad]))
         return StepSigma(self._scale * translation_m, self._scale * rotation_rad)
 
-    def _off_centre_m(self, steps: TipSteps) -> float:
-        """How far the object's middle is from that of its contacts, about which it turns: far for few contacts."""
-        return self.friction.half_width_m / max(_holding(steps), 1.0)
+    def _aside_m(self, missing: float) -> float:
+        """How far from the object's middle the point may be about which it turns: far where few contacts hold it."""
+        return self.friction.half_width_m * min(self.noise.aside + self.noise.aside_missing * missing, 1.0)
 
 
 def _holding(steps: TipSteps) -> float:

@@ -27,18 +27,21 @@ UNPUSHED = LinkTimes()
 @dataclass(frozen=True)
 class CarryNoise:
     """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83,
-    121, 144, 153).
+    121, 144, 153, 158).
 
     Attributes:
         least_m, least_rad: of any carry.
         spread_m, spread_rad: share of the differences between the answers of other assumptions about friction.
         slip_m: share of the slip itself.
-        turned_m, turned_rad: of the turn by which it slipped, per radian, and of its square: contacts that slide far
-            are not where the balance has them.
-        missing_rad: share of the turn by which it slipped, for each fingertip of five that did not hold it.
+        turned_rad: of the square of the turn by which it slipped: contacts that slide far are not where the balance
+            has them.
+        missing_m, missing_rad: share of the slip, and of the turn by which it slipped, for each fingertip of five that
+            did not hold it.
+        aside, aside_missing: how far from its middle the point may be about which the object turns, as shares of its
+            half width: of any carry, and for each fingertip of five that did not hold it; a half width at most.
         round_rad: share of the hand's turn that a round object may be off by, over the fingertips beyond two.
-        roll_m: how far an object whose sides lean rolls or rocks when it is let go and grasped, over the sine.
-        let_go_m_N, let_go_rad_N: what the opening hand does to the object, for each newton with which it still pressed.
+        roll_m: how far an object whose sides face down rolls or rocks when it is let go and grasped, over the sine.
+        let_go_rad_N: how the opening hand turns the object, for each newton with which it still pressed.
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
         closed_m_N, closed_rad_N: for each newton by which it exceeded that while the hand closed the next time.
@@ -49,23 +52,24 @@ class CarryNoise:
             object resisted.
     """
 
-    least_m: float = 0.000035
+    least_m: float = 0.00017
     least_rad: float = float(np.deg2rad(0.17))
-    spread_m: float = 0.45
+    spread_m: float = 0.42
     spread_rad: float = 0.12
     slip_m: float = 0.024
-    turned_m: float = 0.0017
     turned_rad: float = 0.8
+    missing_m: float = 0.05
     missing_rad: float = 0.15
+    aside: float = 0.1
+    aside_missing: float = 0.3
     round_rad: float = 0.07
-    roll_m: float = 0.0035
-    let_go_m_N: float = 0.00007
+    roll_m: float = 0.0039
     let_go_rad_N: float = float(np.deg2rad(0.05))
     pushed_m_N: float = 0.001
     pushed_rad_N: float = float(np.deg2rad(0.5))
     closed_m_N: float = 0.003
     closed_rad_N: float = float(np.deg2rad(1.9))
-    links_m: float = 0.0043
+    links_m: float = 0.003
     links_rad: float = float(np.deg2rad(3.3))
     landed_m_s: float = 0.005
     landed_rad_s: float = float(np.deg2rad(5.0))

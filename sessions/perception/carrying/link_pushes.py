@@ -1,13 +1,8 @@
 """Links that push the object while the hand comes down and closes: they have no sensors, but their motors work.
 
-A finger that closes through free space loads a motor by friction, damping and inertia alone:
-
-    counts = a + b v + c tanh(v / v0) + d dv/dt
-
-with the speed v of its joint. The four are fitted for each motor, robustly, to this session's newest closings as far as
-the finger's tip touched nothing. Counts beyond that are a link's. A joint near one of its ends is left out: there the
-hand presses against its own stop. What friction hides remains hidden, and is larger on real tendons; the scatter of the
-free motions sets the limit.
+What a motor shows beyond its finger's free motion (:mod:`sessions.perception.carrying.free_motions`) is a link's. A
+joint near one of its ends is left out: there the hand presses against its own stop. What friction hides remains hidden,
+and is larger on real tendons; the scatter of the free motions sets the limit.
 
 While the open hand comes down its fingers stand still, and every motor shows one number. A link that lands on the
 object changes it.
@@ -17,7 +12,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,43 +23,24 @@ from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples, SAMPLE_ns
+from sessions.perception.carrying.free_motions import Closing, FreeMotions, terms_of
 from sessions.perception.carrying.net_wrench import tip_loads_N
 
 _CLOSINGS = 6
 """So many of the newest tell how a free finger moves."""
-_EVERY = 2
-"""Sample of which the free motions are fitted; the palm reads half of the motors in a cycle."""
+_LIKE_EACH_OTHER = ("FF", "MF", "RF", "LF")
+"""Fingers whose joints of one name have motors and tendons of one kind."""
 _SMOOTHING = 3.0
 """Samples, of the joint angles; two thirds of it for counts and forces."""
-_STICTION_rad_s = 0.05
 _UNTOUCHED_N = 0.12
 _NEAR_END_rad = 0.05
 _NEAR_END_SAMPLES = 15
-_LEAST_COUNTS, _SIGMAS = 14.0, 4.0
-"""Of a push: more than this, and more than so many robust standard deviations of the free motions."""
 _PUSH_SAMPLES = 6
-"""In a row."""
+"""Of a push, in a row."""
 _LANDED_COUNTS, _STILL_rad_s = 30.0, 0.15
 """Of a landing; open fingers that come down freely stay within 30 counts."""
 _LOWEST_m = 0.002
 """The hand is as low as it comes, up to here above the lowest place."""
-_FIT_SAMPLES, _FITS = 20, 6
-_MEDIAN_TO_SIGMA = 1.48
-
-
-@dataclass(frozen=True)
-class _Closing:
-    """What the motors did in one closing.
-
-    Attributes:
-        terms: of the free motion, shape (n, 20, 4).
-        counts: towards larger angles, shape (n, 20).
-        usable: where the finger's tip touches nothing and the joint is not near an end, shape (n, 20).
-    """
-
-    terms: Array
-    counts: Array
-    usable: NDArray[np.bool_]
 
 
 class LinkPushes:
@@ -82,15 +57,16 @@ class LinkPushes:
         fingers = [name[:2] for name in motors.names]
         self._finger = np.array([FINGERS.index(finger) if finger in FINGERS else 0 for finger in fingers])
         self._watched = np.array([finger in fingertips for finger in fingers])
-        self._closings: deque[_Closing] = deque(maxlen=_CLOSINGS)
+        joints = [name[2:] if name[:2] in _LIKE_EACH_OTHER else name for name in motors.names]
+        self._alike = np.array([[float(joint == other) for other in joints] for joint in joints])
+        self._closings: deque[Closing] = deque(maxlen=_CLOSINGS)
 
     def pushed_s(self, samples: CarrySamples) -> float:
         """How long links of untouched fingers pushed in this closing, the fingers' times added."""
         if samples.motor_counts is None or np.isnan(samples.motor_counts).any():
             return 0.0
         self._closings.append(newest := self._closing(samples, samples.motor_counts))
-        free = _FreeMotions.of(self._closings)
-        return self._time_s((free.off(newest) > free.limits) & newest.usable)
+        return self._time_s(FreeMotions.of(self._closings, self._alike).pushes(newest))
 
     def landed_s(self, samples: CarrySamples) -> float:
         """How long links were on something while the open hand came down, the fingers' times added.
@@ -110,55 +86,15 @@ class LinkPushes:
         by_finger = np.stack([flags[:, self._finger == at].any(axis=1) for at in range(len(FINGERS))], axis=1)
         return float(_runs(by_finger).sum() * SAMPLE_ns / NANOSECONDS)
 
-    def _closing(self, samples: CarrySamples, motor_counts: Array) -> _Closing:
+    def _closing(self, samples: CarrySamples, motor_counts: Array) -> Closing:
         angles_rad = samples.joints_rad @ self._motors.from_joints.T
         speeds = _speeds(angles_rad, samples)
-        changes = np.gradient(speeds, _step_s(samples), axis=0)
-        terms = [np.ones_like(speeds), speeds, np.tanh(speeds / _STICTION_rad_s), changes]
         loads_N = _smooth(tip_loads_N(samples, self._fingertips, self._side), 2 / 3 * _SMOOTHING)
         lower_rad, upper_rad = self._motors.limits_rad.T + _NEAR_END_rad * np.array([[1.0], [-1.0]])
         at_end = maximum_filter1d((angles_rad < lower_rad) | (angles_rad > upper_rad), _NEAR_END_SAMPLES, axis=0)
         untouched = (loads_N < _UNTOUCHED_N)[:, self._finger]
         counts = _smooth(motor_counts * self._motors.sign, 2 / 3 * _SMOOTHING)
-        return _Closing(np.stack(terms, axis=-1), counts, untouched & ~at_end & self._watched)
-
-
-@dataclass(frozen=True)
-class _FreeMotions:
-    """How the motors move free fingers.
-
-    Attributes:
-        coefficients: of the terms, shape (20, 4).
-        limits: counts beyond them that are a push, shape (20,); infinite for a motor that too little is known of.
-    """
-
-    coefficients: Array
-    limits: Array
-
-    @classmethod
-    def of(cls, closings: deque[_Closing]) -> _FreeMotions:
-        """Fitted to closings, robustly."""
-        terms = np.concatenate([each.terms[::_EVERY] for each in closings]).transpose(1, 0, 2)
-        counts = np.concatenate([each.counts[::_EVERY] for each in closings]).T
-        usable = np.concatenate([each.usable[::_EVERY] for each in closings]).T
-        weights, number = usable.astype(float), usable.sum(axis=1)
-        coefficients, scatter = np.zeros(terms.shape[::2]), np.full(len(terms), np.inf)
-        for _ in range(_FITS):
-            weighted = terms * weights[..., None]
-            normal = weighted.transpose(0, 2, 1) @ terms + 1e-3 * np.eye(terms.shape[-1])
-            coefficients = np.linalg.solve(normal, np.einsum("mnk,mn->mk", weighted, counts)[..., None])[..., 0]
-            off = np.abs(counts - (terms @ coefficients[..., None])[..., 0])
-            ordered = np.sort(np.where(usable, off, np.inf), axis=1)
-            scatter = _MEDIAN_TO_SIGMA * ordered[range(len(off)), number // 2]
-            width = 2 * np.clip(scatter, _LEAST_COUNTS / 7, 1e6)
-            weights = usable / (1 + (off / width[:, None]) ** 2)
-        enough = number >= _FIT_SAMPLES / _EVERY
-        limits = np.where(enough, np.maximum(_LEAST_COUNTS, _SIGMAS * scatter), np.inf)
-        return cls(coefficients, limits)
-
-    def off(self, closing: _Closing) -> Array:
-        """By how much the counts are off, shape (n, 20)."""
-        return np.asarray(np.abs(closing.counts - np.einsum("nmk,mk->nm", closing.terms, self.coefficients)))
+        return Closing(terms_of(speeds, _step_s(samples)), counts, untouched & ~at_end & self._watched)
 
 
 def _way_down(samples: CarrySamples) -> CarrySamples | None:

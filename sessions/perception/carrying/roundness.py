@@ -17,8 +17,8 @@ from sessions.perception.carrying.tip_steps import HELD_BY, TipSteps
 _ROUND_m = 0.007
 """Lever at which an object is half as loose as a round one; cylinders have 1 mm, prisms and boxes 8 to 17 mm."""
 _LEAST_SHARE = 0.3
-"""Of the steps in which a finger has to touch to say how the sides lean."""
-_MOST_LEAN = 0.15
+"""Of the steps in which a finger has to touch to say which way a side faces."""
+_MOST_OVERHANG = 0.15
 _LEAST_SPARE = 0.4
 """Friction at the edges of two contacts holds a turn a little, too."""
 _RCOND = 1e-3
@@ -31,12 +31,12 @@ class Roundness:
     Attributes:
         turns: of each step 1 for an object whose turn no normal shows, towards 0 for one with corners, over the
             fingertips beyond the two that any object needs, at least 0.4; 0 where fewer than two held it. Shape (n,).
-        lean: sine of the angle by which its sides lean, at most 0.15: what has no upright sides may have no flat
-            underside.
+        overhang: sine of the angle by which its sides face down, at most 0.15: what gets narrower towards the table may
+            have no flat underside, and is lifted by fingertips that press it.
     """
 
     turns: Array
-    lean: float
+    overhang: float
 
     @classmethod
     def of(cls, steps: TipSteps, balance: Balance) -> Roundness:
@@ -47,7 +47,7 @@ class Roundness:
             return cls(turns, 0.0)
         loose = 1.0 / (1.0 + (_levers_m(balance.entering[held], balance.forces_N[held]) / _ROUND_m) ** 2)
         turns[held] = loose / np.maximum(spare[held], _LEAST_SPARE)
-        return cls(turns, min(_lean(steps), _MOST_LEAN))
+        return cls(turns, min(_overhang(steps), _MOST_OVERHANG))
 
 
 def _levers_m(entering: Array, forces_N: Array) -> Array:
@@ -59,10 +59,10 @@ def _levers_m(entering: Array, forces_N: Array) -> Array:
     return np.asarray(np.sqrt(np.maximum(share[:, 2, 2] - shifts.sum(axis=1), 0.0)))
 
 
-def _lean(steps: TipSteps) -> float:
+def _overhang(steps: TipSteps) -> float:
     felt = steps.felt.astype(float)
     often = felt.mean(axis=0) > _LEAST_SHARE
     if not often.any():
         return 0.0
     upward = (felt * steps.normals[..., 2]).sum(axis=0)[often] / felt.sum(axis=0)[often]
-    return float(np.sqrt(np.mean(upward**2)))
+    return float(np.sqrt(np.mean(np.minimum(upward, 0.0) ** 2)))

@@ -88,6 +88,18 @@ def test_what_the_fingertip_itself_does_is_no_push_of_a_link() -> None:
     assert watched(chance).pushed_s(touching) == 0.0
 
 
+def test_a_link_that_pushes_in_the_second_closing_is_no_free_motion_of_its_finger() -> None:
+    """Of the finger little more is known than that closing; its neighbours tell how it moves freely."""
+    chance = np.random.default_rng(13)
+    links = LinkPushes(MOTORS, TIPS, "right")
+    short = closing(chance)
+    short.readings[20:, :, 1] = 0.5
+    assert links.pushed_s(short) == 0.0
+    pushed = pushing(closing(chance), "MFJ3", during=slice(0, 110))
+    pushed.readings[110:, FINGERS.index("MF"), 1] = 0.5
+    assert links.pushed_s(pushed) > 0.5
+
+
 def test_a_joint_that_presses_against_its_own_end_is_no_push() -> None:
     chance = np.random.default_rng(6)
     ended = closing(chance)

@@ -66,19 +66,21 @@ def test_a_while_in_which_two_fingers_hold_makes_a_turn_as_uncertain_as_they_do(
     assert lost.turns[30] > 5 * lost.turns[10]
 
 
-def test_sides_that_lean_may_roll() -> None:
-    upright, leaning = (turned(DISC, lean=lean) for lean in (0.0, 0.1))
-    assert roundness(leaning).lean == pytest.approx(0.1, abs=0.01)
+def test_sides_that_face_down_may_roll_and_such_as_face_up_do_not() -> None:
+    up, upright, down = (turned(DISC, lean=lean) for lean in (0.1, 0.0, -0.1))
+    assert roundness(down).overhang == pytest.approx(0.1, abs=0.01)
+    assert roundness(up).overhang == roundness(upright).overhang == 0.0
     odometry = CarryOdometry({}, "right")
-    rolled_m2 = odometry.carry(leaning).sigma.translation_m ** 2 - odometry.carry(upright).sigma.translation_m ** 2
-    assert np.sqrt(rolled_m2) == pytest.approx(0.1 * odometry.noise.roll_m, rel=0.1)
+    variances_m2 = [odometry.carry(steps).sigma.translation_m ** 2 for steps in (up, upright, down)]
+    assert np.sqrt(variances_m2[2] - variances_m2[1]) == pytest.approx(0.1 * odometry.noise.roll_m, rel=0.1)
+    assert variances_m2[0] == pytest.approx(variances_m2[1], rel=0.01)
 
 
 def test_an_object_that_nobody_holds_is_not_called_round() -> None:
     steps = turned(DISC)
     lost = replace(steps, forces_N=np.zeros_like(steps.forces_N))
     found = roundness(lost)
-    assert found.lean == 0.0
+    assert found.overhang == 0.0
     assert not found.turns.any()
 
 
