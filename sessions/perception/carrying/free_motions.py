@@ -155,7 +155,8 @@ class _Moves:
         return np.where(self.usable, off, np.inf)
 
     def _scatter(self, coefficients: Array, together: Array) -> Array:
-        """Robust standard deviation of each motor's counts, the middle one of motors that count together."""
+        """Robust standard deviation of each motor's counts; of motors that count together the (lower) middle one."""
         ordered, middle = np.sort(self._off(coefficients), axis=1), self.usable.sum(axis=1) // 2
         own = ordered[range(len(ordered)), np.minimum(middle, ordered.shape[1] - 1)]
-        return np.array([_MEDIAN_TO_SIGMA * np.median(own[row]) for row in together > 0])
+        alike = np.sort(np.where(together > 0, own, np.inf), axis=1)
+        return _MEDIAN_TO_SIGMA * alike[range(len(alike)), (np.count_nonzero(together, axis=1) - 1) // 2]
