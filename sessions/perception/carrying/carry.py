@@ -207,7 +207,7 @@ class CarryOdometry:
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
         noise, held = self.noise, Roundness.of(steps, balance)
         far_m, far_rad, turned_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2], abs(slip[2])
-        slipped_m, missing = float(np.hypot(*slip[:2])), len(FINGERS) - _holding(steps)
+        slipped_m, missing = float(np.hypot(*slip[:2])), _missing(steps)
         while_held_m = noise.least_m + noise.spread_m * far_m + noise.slip_m * slipped_m
         while_held_rad = noise.least_rad + noise.spread_rad * far_rad + noise.turned_rad * turned_rad**2
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
@@ -235,9 +235,9 @@ class CarryOdometry:
         return self.friction.half_width_m * min(self.noise.aside + self.noise.aside_missing * missing, 1.0)
 
 
-def _holding(steps: TipSteps) -> float:
-    """How many fingertips held the object, in the mean."""
-    return float(steps.felt.sum(axis=1).mean())
+def _missing(steps: TipSteps) -> float:
+    """How many of the five fingertips did not hold the object, in the mean: each that does checks its turn."""
+    return len(FINGERS) - float(steps.felt.sum(axis=1).mean())
 
 
 def _other_assumptions(usual: Friction, measured: MeasuredFriction) -> Sequence[Friction]:

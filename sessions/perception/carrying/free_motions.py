@@ -29,6 +29,8 @@ _ROUGHER = 2.0
 """A motor scatters no more than so many times as much as those of other fingers do."""
 _LEAST_COUNTS, _SIGMAS = 14.0, 4.0
 """Of a push: more than this, and more than so many robust standard deviations of the free motions."""
+_ANY_COUNTS = 1e6
+"""More than any gauge shows."""
 _FIT_SAMPLES, _FITS = 20, 6
 _MEDIAN_TO_SIGMA = 1.48
 
@@ -133,15 +135,14 @@ class _Moves:
         """Fitted by reweighted least squares, around what is known.
 
         Args:
-            known: before; its scatter is the largest. Without any coefficients all samples count alike at first.
+            known: before; its scatter is the largest. Where that is infinite all samples count alike at first.
             together: 1 for each pair of motors whose samples count for both, shape (20, 20).
         """
-        fit, weights = known, self.usable.astype(float)
+        fit = known
         known_right = (known.squares @ known.coefficients[..., None])[..., 0]
-        for step in range(_FITS):
-            if step or known.coefficients.any():
-                width = 2 * np.clip(np.minimum(fit.scatter, known.scatter), _LEAST_COUNTS / 7, 1e6)
-                weights = 1 / (1 + (self._off(fit.coefficients) / width[:, None]) ** 2)
+        for _ in range(_FITS):
+            width = 2 * np.clip(np.minimum(fit.scatter, known.scatter), _LEAST_COUNTS / 7, _ANY_COUNTS)
+            weights = 1 / (1 + (self._off(fit.coefficients) / width[:, None]) ** 2)
             weighted = self.terms * weights[..., None]
             squares = np.tensordot(together, weighted.transpose(0, 2, 1) @ self.terms, 1) + known.squares
             right = together @ np.einsum("mnk,mn->mk", weighted, self.counts) + known_right
