@@ -146,7 +146,7 @@ class CarryOdometry:
                 width.
         """
         excess_N, noise = max(closing_N - _USUAL_NET_N, 0.0), self.noise
-        pushed = links.pushed_s**_FARTHER_THE_LONGER
+        pushed = float(np.hypot(links.opened_s**_FARTHER_THE_LONGER, links.closed_s**_FARTHER_THE_LONGER))
         causes = self._scale * np.array([excess_N, pushed, links.landed_s])
         moved_m = self._scale * given_way_m
         turned_rad = moved_m / self.friction.half_width_m

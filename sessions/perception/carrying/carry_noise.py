@@ -9,15 +9,17 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LinkTimes:
-    """For how long links were on the object after a carry, which feel nothing; seconds.
+    """For how long links were on the object, which feel nothing; seconds.
 
     Attributes:
-        pushed_s: while the hand closed again.
-        landed_s: while it came down before.
+        opened_s: while the hand opened after a carry.
+        landed_s: while it came down again.
+        closed_s: while it closed again.
     """
 
-    pushed_s: float = 0.0
+    opened_s: float = 0.0
     landed_s: float = 0.0
+    closed_s: float = 0.0
 
 
 UNPUSHED = LinkTimes()

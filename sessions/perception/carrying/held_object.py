@@ -11,11 +11,10 @@ from drivers.core.fingertip import ContinuousFingertip, FingertipSensor
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry import Carry, CarryOdometry
-from sessions.perception.carrying.carry_noise import LinkTimes
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.force_delay import ForceDelay
 from sessions.perception.carrying.given_way import given_way_m
-from sessions.perception.carrying.link_pushes import LinkPushes
+from sessions.perception.carrying.links.watched_links import WatchedLinks
 from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.carrying.slip import Slip, slip
 from sessions.perception.carrying.tip_steps import tip_steps
@@ -43,18 +42,15 @@ class HeldObject:
         motors: MotorMap | None = None,
     ) -> None:
         self.fingertips = {f: tip for f, tip in fingertips.items() if isinstance(tip, ContinuousFingertip)}
-        self._record, self._descent = (CarryRecord(self.fingertips) for _ in range(2))
+        self._record = CarryRecord(self.fingertips)
         self.odometry = CarryOdometry(self.fingertips, side, scale)
         """Estimates the carries."""
 
-        self._from_ns, self._tared_ns, self._side = 0, 0, side
-        self._links = None if motors is None else LinkPushes(motors, self.fingertips, side)
+        self._from_ns, self._side, self._is_grasped = 0, side, False
+        self.links = WatchedLinks(motors, self.fingertips, side)
+        """What they may have done to the object."""
         self.delay = ForceDelay(self.fingertips, side)
         """How late forces arrive."""
-        self.pushed_s = 0.0
-        """How long links pushed while the hand closed for the last capture."""
-        self.landed_s, self._is_grasped = 0.0, False
-        """How long they were on the object while the hand came down for it."""
         self.closing_N = 0.0
         """Largest net force of the fingertips along the table while the hand closed for the last capture.
 
@@ -73,48 +69,34 @@ class HeldObject:
     @property
     def is_watched(self) -> bool:
         """Whether an object is grasped, or is going to be, and :meth:`on_hand` is wanted."""
-        return any(record.is_open for record in self._records)
-
-    @property
-    def _records(self) -> tuple[CarryRecord, ...]:
-        return self._record, self._descent
+        return self._record.is_open or self.links.is_watching
 
     def on_hand(
         self, stamp_ns: int, joints_rad: Array, world_T_forearm: Array, motor_counts: Array | None = None
     ) -> None:
         """Joint angles, shape (24,), the forearm's pose, shape (4, 4), and the motors' strain gauges, shape (20,)."""
-        for record in self._records:
-            if record.is_open:
-                record.take(stamp_ns, joints_rad, world_T_forearm, motor_counts)
+        self.links.on_hand(stamp_ns, joints_rad, world_T_forearm, motor_counts)
+        if self._record.is_open:
+            self._record.take(stamp_ns, joints_rad, world_T_forearm, motor_counts)
 
     def on_tare(self, stamp_ns: int) -> None:
         """The hand is above the object and free, and comes down for it; or it has risen to come down again."""
-        self._come_down(stamp_ns)
         self._record.end()
+        self.links.on_tare(stamp_ns)
         if self._is_grasped:
-            self.landed_s, self._moved_m, self._is_grasped = 0.0, 0.0, False
-        if self._links is not None:
-            self._tared_ns = stamp_ns
-            self._descent.begin()
-
-    def _come_down(self, until_ns: int) -> None:
-        """Whatever links landed on from the tare until now counts."""
-        down = self._descent.since(self._tared_ns) if self._descent.is_open else None
-        down = None if down is None else down.until(until_ns)
-        if down is not None and self._links is not None:
-            self.landed_s += self._links.landed_s(down)
-        self._descent.end()
+            self._moved_m, self._is_grasped = 0.0, False
 
     def on_close(self, stamp_ns: int) -> None:
         """The fingers begin to close; the object may be pushed."""
-        self._come_down(stamp_ns)
+        self.links.on_close(stamp_ns)
         self._from_ns = stamp_ns
         self._record.begin()
 
     def on_capture(self, stamp_ns: int) -> None:
         """The fingers have closed and rest: whatever moves the object from now on counts."""
         closing = self._record.since(self._from_ns) if self._record.is_open else None
-        self.closing_N, self.pushed_s, self.given_way_m = 0.0, 0.0, 0.0
+        self.closing_N, self.given_way_m = 0.0, 0.0
+        self.links.on_closing(closing)
         if closing is not None:
             self._take_closing(closing)
         self._from_ns = stamp_ns
@@ -123,8 +105,6 @@ class HeldObject:
     def _take_closing(self, closing: CarrySamples) -> None:
         """What pushed the object while the hand closed, and how far."""
         self.closing_N = largest_net_N(closing, self.fingertips, self._side)
-        if self._links is not None:
-            self.pushed_s = self._links.pushed_s(closing)
         self.given_way_m = given_way_m(tip_steps(closing, self.fingertips, self._side))
         self._moved_m = max(self._moved_m, self.given_way_m)
         self.delay.on_closing(closing)
@@ -132,6 +112,7 @@ class HeldObject:
     def on_grasp(self, measured: Measured) -> None:
         """The capture's contacts; the object was where they say in the middle of the capture."""
         self._from_ns, self._is_grasped = measured.stamp_ns, True
+        self.links.on_grasp()
         if measured.contacts:
             self.contact_height_m = float(np.mean([contact.point_world_m[2] for contact in measured.contacts]))
         self.odometry.on_grasp(measured.contacts)
@@ -143,8 +124,8 @@ class HeldObject:
 
     def on_left(self) -> None:
         """The object is not held."""
-        for record in self._records:
-            record.end()
+        self._record.end()
+        self.links.on_left()
 
     def samples_since(self, stamp_ns: int) -> CarrySamples | None:
         """Readings of hand and fingertips since a moment of this grasp; None for too little."""
@@ -166,12 +147,11 @@ class HeldObject:
         """How far an object that nobody carried may have moved, before the hand closed around it; None where pushes
         are not felt: without fingertips that measure them, or without motors that tell of links.
         """
-        return self.odometry.stood if self.fingertips and self._links is not None else None
+        return self.odometry.stood if self.fingertips and self.links.are_heard else None
 
     def then_closed(self, sigma: StepSigma | None) -> StepSigma | None:
         """How well the object's motion is known at a capture, of what was known of it when the hand had opened."""
-        pushes = LinkTimes(self.pushed_s, self.landed_s)
-        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, pushes, self._moved_m)
+        return None if sigma is None else self.odometry.closed(sigma, self.closing_N, self.links.times, self._moved_m)
 
     def end_hold(self, until_ns: int | None = None) -> Carry | None:
         """The carry since the capture; the object is held on if ``until_ns`` is given, which is now."""
@@ -179,4 +159,5 @@ class HeldObject:
         self.carry = None if samples is None else self.odometry.estimate(samples)
         if until_ns is None:
             self._record.end()
+            self.links.on_let_go(self._from_ns if samples is None else int(samples.stamps_ns[-1]))
         return self.carry

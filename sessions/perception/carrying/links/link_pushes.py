@@ -1,8 +1,8 @@
-"""Links that push the object while the hand comes down and closes: they have no sensors, but their motors work.
+"""Links that push the object while the hand comes down, closes and opens: they have no sensors, but their motors work.
 
-What a motor shows beyond its finger's free motion (:mod:`sessions.perception.carrying.free_motions`) is a link's. A
-joint near one of its ends is left out: there the hand presses against its own stop. What friction hides remains hidden,
-and is larger on real tendons; the scatter of the free motions sets the limit.
+What a motor shows beyond its finger's free motion (:mod:`sessions.perception.carrying.links.free_motions`) is a
+link's. A joint near one of its ends is left out: there the hand presses against its own stop. What friction hides
+remains hidden, and is larger on real tendons; the scatter of the free motions sets the limit.
 
 While the open hand comes down its fingers stand still, and every motor shows one number. A link that lands on the
 object changes it.
@@ -23,7 +23,7 @@ from drivers.core.fingertip import ContinuousFingertip
 from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples, SAMPLE_ns
-from sessions.perception.carrying.free_motions import Closing, FreeMotions, terms_of
+from sessions.perception.carrying.links.free_motions import Closing, FreeMotions, terms_of
 from sessions.perception.carrying.net_wrench import tip_loads_N
 
 _CLOSINGS = 6
@@ -40,7 +40,7 @@ _PUSH_SAMPLES = 6
 _LANDED_COUNTS, _STILL_rad_s = 30.0, 0.15
 """Of a landing; open fingers that come down freely stay within 30 counts."""
 _LOWEST_m = 0.002
-"""The hand is as low as it comes, up to here above the lowest place."""
+"""The hand is as low as it comes, or where it let go, up to here above that place."""
 
 
 class LinkPushes:
@@ -59,14 +59,24 @@ class LinkPushes:
         self._watched = np.array([finger in fingertips for finger in fingers])
         joints = [name[2:] if name[:2] in _LIKE_EACH_OTHER else name for name in motors.names]
         self._alike = np.array([[float(joint == other) for other in joints] for joint in joints])
-        self._closings: deque[Closing] = deque(maxlen=_CLOSINGS)
+        self._closings, self._openings = (deque[Closing](maxlen=_CLOSINGS) for _ in range(2))
 
-    def pushed_s(self, samples: CarrySamples) -> float:
+    def closed_s(self, samples: CarrySamples) -> float:
         """How long links of untouched fingers pushed in this closing, the fingers' times added."""
+        return self._pushed_s(samples, self._closings)
+
+    def opened_s(self, samples: CarrySamples) -> float:
+        """How long links of fingers that have let go pushed in this opening, until the hand rises; the fingers' times
+        added.
+        """
+        opening = _until_it_rises(samples)
+        return 0.0 if opening is None else self._pushed_s(opening, self._openings)
+
+    def _pushed_s(self, samples: CarrySamples, before: deque[Closing]) -> float:
         if samples.motor_counts is None or np.isnan(samples.motor_counts).any():
             return 0.0
-        self._closings.append(newest := self._closing(samples, samples.motor_counts))
-        return self._time_s(FreeMotions.of(self._closings, self._alike).pushes(newest))
+        before.append(newest := self._closing(samples, samples.motor_counts))
+        return self._time_s(FreeMotions.of(before, self._alike).pushes(newest))
 
     def landed_s(self, samples: CarrySamples) -> float:
         """How long links were on something while the open hand came down, the fingers' times added.
@@ -102,6 +112,13 @@ def _way_down(samples: CarrySamples) -> CarrySamples | None:
     heights_m = samples.world_T_forearm[:, 2, 3]
     lowest = np.flatnonzero(heights_m < heights_m.min() + _LOWEST_m)
     return samples.until(int(samples.stamps_ns[lowest[-1]]))
+
+
+def _until_it_rises(samples: CarrySamples) -> CarrySamples | None:
+    """Until the hand is above where it let go; None for too little."""
+    heights_m = samples.world_T_forearm[:, 2, 3]
+    above = np.flatnonzero(heights_m > heights_m[0] + _LOWEST_m)
+    return samples.until(int(samples.stamps_ns[above[0]])) if len(above) else samples
 
 
 def _runs(flags: NDArray[np.bool_]) -> NDArray[np.bool_]:

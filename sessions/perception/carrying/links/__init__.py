@@ -1,0 +1,1 @@
+"""Links that push the object: they feel nothing, but their motors work."""
