@@ -21,7 +21,8 @@ class TouchSettings(StrictModel):
         force_N: force that every fingertip is then brought to.
         most_N: force on any fingertip at which the hand stops moving.
         reach_m: how far a fingertip moves to reach that force.
-        gain: its speed per force error, m/s per N.
+        search_m_s: its speed until it feels something.
+        gain: its speed per force error from then on, m/s per N.
         sink_m: how far the hand itself keeps moving.
         press_s: time for both.
         capture_s: length of the capture.
@@ -46,10 +47,11 @@ class TouchSettings(StrictModel):
     met_N: float = Field(default=0.20, gt=0.0)
     force_N: float = Field(default=0.35, gt=0.0)
     most_N: float = Field(default=0.45, gt=0.0)
-    reach_m: float = Field(default=0.008, ge=0.0)
+    reach_m: float = Field(default=0.010, ge=0.0)
+    search_m_s: float = Field(default=0.012, gt=0.0)
     gain: float = Field(default=0.04, gt=0.0)
     sink_m: float = Field(default=0.004, ge=0.0)
-    press_s: float = Field(default=0.6, ge=0.0)
+    press_s: float = Field(default=0.9, ge=0.0)
     capture_s: float = Field(default=0.2, gt=0.0)
     rake_height_m: float = Field(default=0.028, gt=0.0)
     rake_m_s: float = Field(default=0.05, gt=0.0)

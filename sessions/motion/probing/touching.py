@@ -46,6 +46,9 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 _BELOW_m = 0.003
 """Below the top as it is known: what a tap meets from there on is a rim or a slope, on which links land."""
 
+_FELT_N = 0.05
+"""A fingertip that carries more has met something."""
+
 _SUNK_s = 0.2
 """So much longer fingertips are laid on where the hand sinks meanwhile."""
 
@@ -180,14 +183,17 @@ class Toucher:
         return SideTouch(landed, np.tile(-lane.ahead, (len(landed), 1)))
 
     def _lay_against(self, lane: Lane) -> Array:
-        """Toward the side until it is met, and the fingertips against it: their foremost places, shape (n, 3)."""
+        """Toward the side until it is met, and the fingertips against it: their foremost places, shape (n, 3).
+
+        Where a link has met it alone they stay where they are: links would push what the fingertips do not reach.
+        """
         motion, along = self._motion, np.array(lane.table.approach)
         motion.runtime.begin_closing()
         if not self._approach(lane.joints(motion, -lane.past_m), self.settings.side_m_s):
             self.capture()  # only that there is nothing
             return np.empty((0, 3))
-        landed = self._landing_points(along, lane.frame)
-        self._lay_on(lane.table, lane.column, along, lane.frame, self.settings.rake_N, 0.0, lane.place.up_to_m)
+        if len(landed := self._landing_points(along, lane.frame)):
+            self._lay_on(lane.table, lane.column, along, lane.frame, self.settings.rake_N, 0.0, lane.place.up_to_m)
         self.capture()
         return landed
 
@@ -277,6 +283,7 @@ class Toucher:
     ) -> None:
         """Every fingertip moves along a direction until it has the contact force, or has reached its limit.
 
+        At first it searches; once it has felt something it follows its force alone, lest it runs after what gives way.
         The hand sinks a little meanwhile, and fingers that touch yield: the thumb can hardly move in that direction
         itself. While a fingertip is pressed hard, or a link leans on something, the hand draws back; once a link has
         done so it sinks no more. Where only finding the object matters, only links that lean hard are heeded.
@@ -285,7 +292,7 @@ class Toucher:
         rates = motor_rates(table, pattern.progress, direction_grasp, self._hand)
         rates = {f: motors for f, motors in rates.items() if f in self.guard.met or self._height_m(f) <= up_to_m}
         force_N = force_N if len(rates) > 1 else max(force_N, s.alone_N)
-        gone_m = dict.fromkeys(rates, 0.0)
+        gone_m, found = dict.fromkeys(rates, 0.0), set(self.guard.met)
         leans = leans or self.guard.leans
         self.guard.keep_usual()
         start, sunk_m, has_leaned = motion.runtime.perception.hand.base_q.copy(), 0.0, False
@@ -299,8 +306,11 @@ class Toucher:
             elif not has_leaned:
                 sunk_m = min(sunk_m + step_m, sink_m)
             motion.set_base(start + sunk_m * way)
+            found |= {finger for finger, load_N in motion.loads_N().items() if load_N > _FELT_N}
+            found |= set(motion.bent(self._cycle.held_up_rad))
             for finger, load_N in ((f, load_N) for f, load_N in motion.loads_N().items() if f in rates):
-                moved_m = s.gain * float(np.clip(force_N - load_N, -1.0, 1.0)) * motion.cycle_s
+                speed_m_s = s.gain * np.clip(force_N - load_N, -1.0, 1.0) if finger in found else s.search_m_s
+                moved_m = float(speed_m_s) * motion.cycle_s
                 gone_m[finger] = float(np.clip(gone_m[finger] + moved_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)
             for finger in rates.keys() - pattern.held_rad.keys():

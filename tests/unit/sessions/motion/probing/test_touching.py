@@ -150,6 +150,25 @@ def test_a_hand_that_waited_for_a_pressed_finger_goes_on_from_there(monkeypatch:
     assert abs(heights[-1] - start) > 0.003
 
 
+def test_fingertips_that_have_felt_nothing_yet_are_laid_on_as_far_as_they_reach(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Towards a force alone they would come a third of the way; towards one that is lost they would push on."""
+    motion, set_rad, touch = motion_on(DiscWorld(disc())), {}, QUICK.touch
+    loads_N = {"FF": [0.13], "MF": [0.01], "RF": [0.01], "LF": [0.10, 0.05], "TH": [0.0]}
+    toucher, towards = Toucher(motion, QUICK, TIP), np.array([0.0, -1.0, 0.0])
+    table, cycles = closing(sideways("pinch", "left"), 0.05, TIP), motion.cycles(touch.press_s)
+    monkeypatch.setattr(motion, "loads_N", lambda: {finger: felt_N[0] for finger, felt_N in loads_N.items()})
+    monkeypatch.setattr(motion, "set_fingers", lambda table, progress, aside: set_rad.update(aside))
+    monkeypatch.setattr(motion, "tick", lambda: loads_N.update(LF=loads_N["LF"][-1:]))
+    toucher._lay_on(table, COLUMN, towards, GraspFrame(0.0, 0.0, 0.0), touch.rake_N, 0.0)
+    followed_m = {finger: touch.gain * (touch.rake_N - loads_N[finger][0]) * touch.press_s for finger in ("FF", "LF")}
+    per_m = motor_rates(table, COLUMN.progress, towards, TIP)
+    for finger, gone_m in {**followed_m, "MF": touch.reach_m, "RF": touch.reach_m}.items():
+        for motor, rate in per_m[finger].items():
+            assert set_rad[motor] == pytest.approx(rate * gone_m, rel=3 / cycles)
+
+
 def test_one_coming_touches_a_side_at_several_places_and_draws_back_between_them() -> None:
     felt: list[bool] = []
 
