@@ -169,6 +169,22 @@ def test_fingertips_that_have_felt_nothing_yet_are_laid_on_as_far_as_they_reach(
             assert set_rad[motor] == pytest.approx(rate * gone_m, rel=3 / cycles)
 
 
+@pytest.mark.parametrize(("felt_N", "is_laid"), [(0.25, True), (0.0, False)])
+def test_no_fingertip_is_laid_on_what_a_link_has_met_alone(
+    felt_N: float, is_laid: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fingers that flex behind such a link would push the object with it."""
+    world, table, done = DiscWorld(disc()), closing(sideways("pinch", "left"), 0.05, TIP), []
+    toucher = Toucher(motion_on(world), QUICK, TIP)
+    lane = Lane(table, lowest_ahead(table, TIP, 0.05), TouchPlace(GraspFrame(0.0, 0.0, 0.0), 0.05), 0.012, 0.02)
+    monkeypatch.setattr(toucher, "_approach", lambda *args: True)
+    monkeypatch.setattr(toucher, "_lay_on", lambda *args: done.append("laid on"))
+    monkeypatch.setattr(toucher._motion, "loads_N", lambda: dict.fromkeys(FINGERS, 0.0) | {"MF": felt_N})
+    assert len(toucher._lay_against(lane)) == is_laid
+    assert done == ["laid on"] * is_laid
+    assert world.session_events[-1] is EventKind.TOUCH_END
+
+
 def test_one_coming_touches_a_side_at_several_places_and_draws_back_between_them() -> None:
     felt: list[bool] = []
 
