@@ -46,9 +46,6 @@ _DOWN = np.array([0.0, 0.0, -1.0])
 _BELOW_m = 0.003
 """Below the top as it is known: what a tap meets from there on is a rim or a slope, on which links land."""
 
-_FELT_N = 0.05
-"""A fingertip that carries more has met something."""
-
 _SUNK_s = 0.2
 """So much longer fingertips are laid on where the hand sinks meanwhile."""
 
@@ -200,7 +197,7 @@ class Toucher:
     def _has_given_way(self, landed_m: Array) -> bool:
         """Whether what fingertips have met at these places, shape (n, 3), is not felt any more."""
         felt_N = max(self._motion.loads_N().values(), default=0.0)
-        return len(landed_m) > 0 and felt_N < self.settings.met_N / 4
+        return len(landed_m) > 0 and felt_N < self._felt_N
 
     def _go_along(self, lane: Lane) -> bool:
         """Back a little, and over to another lane. Returns whether nothing was met there."""
@@ -244,6 +241,11 @@ class Toucher:
         surface = TipSurface.upright(self._hand.semi_axes_m, self._hand.centre_distal_m)
         frames = self._motion.runtime.perception.hand.world_T_distal
         return np.array([surface.leading_point(frames[f].matrix(), ahead) for f in met]).reshape(-1, 3)
+
+    @property
+    def _felt_N(self) -> float:
+        """A fingertip that carries more feels something."""
+        return self.settings.met_N / 4
 
     @property
     def _travel(self) -> tuple[float, float]:
@@ -300,17 +302,18 @@ class Toucher:
         way = np.zeros(6)
         way[:3] = motion.runtime.world_T_mount.rotation().unrotate(frame.pose.rotation().rotate(direction_grasp))
         for _ in motion.shares(s.press_s + (_SUNK_s if sink_m else 0.0)):
+            loads_N = motion.loads_N()
             has_leaned |= (is_leaning := leans())
-            if is_leaning or max(motion.loads_N().values(), default=0.0) >= s.most_N:
+            if is_leaning or max(loads_N.values(), default=0.0) >= s.most_N:
                 sunk_m = max(sunk_m - step_m, -sink_m)
             elif not has_leaned:
                 sunk_m = min(sunk_m + step_m, sink_m)
             motion.set_base(start + sunk_m * way)
-            found |= {finger for finger, load_N in motion.loads_N().items() if load_N > _FELT_N}
+            found |= {finger for finger, load_N in loads_N.items() if load_N > self._felt_N}
             found |= set(motion.bent(self._cycle.held_up_rad))
-            for finger, load_N in ((f, load_N) for f, load_N in motion.loads_N().items() if f in rates):
-                speed_m_s = s.gain * np.clip(force_N - load_N, -1.0, 1.0) if finger in found else s.search_m_s
-                moved_m = float(speed_m_s) * motion.cycle_s
+            for finger in rates.keys() & loads_N.keys():
+                error_N = float(np.clip(force_N - loads_N[finger], -1.0, 1.0))
+                moved_m = (s.gain * error_N if finger in found else s.search_m_s) * motion.cycle_s
                 gone_m[finger] = float(np.clip(gone_m[finger] + moved_m, -s.reach_m, s.reach_m))
             aside = pattern.aside(table)
             for finger in rates.keys() - pattern.held_rad.keys():
