@@ -78,6 +78,14 @@ class Arrival:
                 break
         return guard.met
 
+    def come_up(self, place: Place) -> None:
+        """As far as fingertips may be beside the object, slowly: one may be under a rim."""
+        s, motion = self._settings, self._motion
+        inside_m = lowest_inside_m(place.table.name, place.table.height_m, self._hand)
+        tips_m, _ = self._slower_from_m(place.table, inside_m)
+        if self.short_of_m(place) < tips_m:
+            motion.move_base(motion.base_joints(place.frame, place.table, tips_m), s.approach_m_s, s.turn_rad_s)
+
     def _slower_from_m(self, table: Closing, inside_m: float) -> tuple[float, float]:
         """How far above the grasp the tips may meet the top, and links of which the lowest will be at ``inside_m``."""
         top_m, opened = top_at_most_m(self._motion), open_hand(table.name, table.height_m, self._hand)

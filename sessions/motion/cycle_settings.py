@@ -37,7 +37,8 @@ class TouchSettings(StrictModel):
         lowest_m: height of the fingertips over the table where a tap has missed the object.
         below_top_m: a tap without a grasp goes no farther below the top: what stands between the fingers, a neck or a
             rim, must not reach the knuckles.
-        side_m_s: speed toward an object's side, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s.
+        side_m_s: speed toward an object's side and along it, palm upright; a stiff fingertip reaches 0.45 N at 20 mm/s
+            as it comes, and 1.1 N at 30 mm/s as it meets a rim on its way along.
         side_heights_m: height of the lowest fingertip in such a touch, the first finger down and up. The
             forearm lets it come no lower; from higher up it would tip objects over.
     """
@@ -78,7 +79,7 @@ class CycleSettings(StrictModel):
         landing_m_s: and next to the object; on a thumb, stiff in that direction, 35 mm/s end with 1.6 N.
         links_landing_m_s: and where links may land on it, which are stiffer still: 18 mm/s end with 1.9 to 3.3 N.
         beside_m_s: the same where nothing is expected below.
-        approach_m_s: speed of the guarded approach from the side.
+        approach_m_s: speed of the guarded approach from the side, and up from beside an object.
         landing_force_N: a fingertip force during the descent that means the object is under it.
         landing_shift_m: how far the grasp moves toward the finger that landed.
         landing_tries: descents before the grasp is given up.

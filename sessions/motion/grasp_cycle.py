@@ -109,6 +109,7 @@ class GraspCycle:
                 self._motion.supervisor.on_approach()
                 return True
             up_m = self._arrival.short_of_m(self._place)
+            self._arrival.come_up(self._place)
             self.lift()
             if (again := self._otherwise(plan, hit, landed, up_m)) is None:
                 return False

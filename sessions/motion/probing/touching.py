@@ -49,6 +49,9 @@ _BELOW_m = 0.003
 _SUNK_s = 0.2
 """So much longer fingertips are laid on where the hand sinks meanwhile."""
 
+_FINGER_END_m = 0.05
+"""The two links behind a fingertip are so long."""
+
 _AWAY_m = 0.03
 """From a side that is known, while the hand goes along it."""
 
@@ -77,8 +80,11 @@ class Toucher:
         self._motion.tallest_m = height_m
 
     def on_top(self, height_m: float) -> None:
-        """The top was looked for, and nothing taller found: the first approach has ended well."""
-        self.expect_tallest(height_m)
+        """The top was looked for, and nothing taller found: the first approach has ended well.
+
+        Where a link has landed, fingertips may have been inside a rim, and the rim is higher.
+        """
+        self.expect_tallest(height_m + (_FINGER_END_m if LINKS in self.guard.met else 0.0))
         self._motion.supervisor.on_approach()
 
     def tap(self, frame: GraspFrame, below_top_m: float = np.inf) -> Array:
@@ -208,7 +214,7 @@ class Toucher:
         motion.blend_fingers(lane.table, lane.column.progress, cycle.finger_rad_s, lane.column.aside(lane.table))
         motion.runtime.begin_closing()
         self.guard.restart()
-        return motion.probe_base(over, cycle.approach_m_s, self.guard.is_met)
+        return motion.probe_base(over, self.settings.side_m_s, self.guard.is_met)
 
     def _meet_again(self, lane: Lane) -> None:
         """What a fingertip met on the way to another lane, of a handle perhaps, is felt: the hand has turned back from

@@ -12,9 +12,10 @@ from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.experiments.data.sensing import SimulatedGrasps
 from tactile_lab.experiments.run_metrics import contour_figures, mesh_figures
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.model import FittedShape
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape
+from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 
 SHAPE_MODELS: dict[str, GpisSettings] = {

@@ -2,7 +2,8 @@
 
 A closed shape says nothing about how much of it was felt: contacts in one corner of a box give a small closed body. A
 point of the shape counts as known if a contact that the estimate uses lies near, on a side that faces the same way, and
-if its standard deviation is small. The part of a standing object that rests on the table is known from the table.
+if its standard deviation is small. The part of a standing object that rests on the table is known from the table, and
+the inside of a wall from its outside: fingers were beside it, and the rim tells how thick it is.
 """
 
 from __future__ import annotations
@@ -49,6 +50,9 @@ LARGEST_SIGMA_m = 0.005
 
 _BLOCK = 100
 """Number of contacts that are compared with all of a surface at once."""
+
+_FACING_m = 0.02
+"""What normals count beside places: the outside of a wall is what is nearest and faces the other way."""
 
 _DOWN = -0.95
 
@@ -98,7 +102,7 @@ def known_part(
     if isinstance(shape, Contour):
         near = distances_m < reach_m
     else:
-        near = (distances_m < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
+        near = _lined(shape, distances_m < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
         if floor_m is not None:
             unfelt = unfelt_top(shape, contacts.points_m, contacts.normals, near)
             foot = (sides.points_m[:, 2] < floor_m + LEVEL_SIGMA_m) & (sides.normals[:, 2] < _DOWN)
@@ -162,6 +166,18 @@ def _surface(mesh: SurfaceMesh) -> _Sides:
 
 def _meeting(points: NDArray[np.intp], pieces: NDArray[np.intp], shape: tuple[int, int]) -> csr_array:
     return csr_array((np.ones(len(points), dtype=np.float32), (points, pieces)), shape=shape)
+
+
+def _lined(mesh: SurfaceMesh, near: Mask) -> Mask:
+    """What was touched, shape (n,), with the inside of walls whose outside was."""
+    if mesh.lining is None or not mesh.lining.any():
+        return near
+    facing = _FACING_m * mesh.normals
+    others = np.hstack([mesh.vertices, facing])[~mesh.lining]
+    across = cKDTree(others).query(np.hstack([mesh.vertices, -facing])[mesh.lining])[1]
+    lined = near.copy()
+    lined[mesh.lining] |= near[~mesh.lining][across]
+    return lined
 
 
 def _contradicted(mesh: SurfaceMesh, free_m: Array | None) -> Mask:

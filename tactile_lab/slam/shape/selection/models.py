@@ -18,9 +18,10 @@ from tactile_lab.slam.shape.baselines.point_cloud import PointCloudShape
 from tactile_lab.slam.shape.baselines.superquadric import fit_superquadric
 from tactile_lab.slam.shape.baselines.superquadric_shape import SuperquadricShape
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.planar.segmentation import PlanarContacts, order_along
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape, polygon_of
+from tactile_lab.slam.shape.selection.planar_choice import best_shape, polygon_of
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.surfaces.surface import extract_contour
 

@@ -17,6 +17,7 @@ from scipy.special import log_ndtr
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.planar.corners import at_corners
 from tactile_lab.slam.shape.planar.outlines import encloses
@@ -26,7 +27,7 @@ from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
 from tactile_lab.slam.shape.planar.segmentation import PlanarContacts, segment
 from tactile_lab.slam.shape.selection.spatial_choice import best_spatial_shape
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
-from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour, extract_mesh, slope_of
+from tactile_lab.slam.shape.surfaces.surface import Contour
 
 SharpOutline: TypeAlias = Polygon | RoundedOutline
 
@@ -36,36 +37,6 @@ FINGERTIP_RADIUS_m = 0.006
 _FREE_WEIGHT = 0.5
 _ON_OUTLINE_SIGMAS = 5.0
 _ON_FACE_SIGMAS, _BEYOND_m = 3.0, 0.010
-
-
-class GpisShape:
-    """A field as a :class:`FittedShape`.
-
-    Attributes:
-        name: "gpis".
-        gpis: the field.
-    """
-
-    name = "gpis"
-
-    def __init__(self, gpis: Gpis) -> None:
-        self.gpis = gpis
-
-    @property
-    def log_evidence(self) -> float | None:
-        """The log marginal likelihood; None with off-surface points, which other models do not explain."""
-        return self.gpis.log_marginal_likelihood() if self.gpis.settings.observations == "normals" else None
-
-    def contour(self, resolution_m: float = 0.001) -> Contour:
-        return extract_contour(self.gpis, resolution_m=resolution_m)
-
-    def covariance_m2(self, places_m: Array) -> Array:
-        """Covariance of displacements along the normals at places on the outline, shapes (q, 2) and (q, q)."""
-        slopes = self.gpis.sigma_inflation / slope_of(self.gpis.gradient(places_m))
-        return np.asarray(self.gpis.joint_covariance(places_m) * slopes[:, None] * slopes)
-
-    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
-        return extract_mesh(self.gpis, resolution_m=resolution_m, floor_m=floor_m)
 
 
 def best_shape(gpis: Gpis, free_points_m: Array | None = None, floor_m: float | None = None) -> FittedShape:

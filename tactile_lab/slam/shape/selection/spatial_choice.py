@@ -13,6 +13,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.drawn_field import DrawnField, PRICE_nats
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.model import FittedShape
@@ -26,7 +27,7 @@ from tactile_lab.slam.shape.selection.contradictions import (
 from tactile_lab.slam.shape.selection.held_out import predicts_better, predicts_better_than
 from tactile_lab.slam.shape.selection.round_choice import revolving
 from tactile_lab.slam.shape.selection.unexplained import unexplained
-from tactile_lab.slam.shape.solids.hollow import hollowed
+from tactile_lab.slam.shape.solids.hollow import Hollow, are_entered, felt_inside, hollowed
 from tactile_lab.slam.shape.solids.lying import Lying
 from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
@@ -60,7 +61,8 @@ def best_spatial_shape(
 
     A sharp solid is accepted only if it is consistent with what is known: its contacts lie on its surface, and it does
     not fill places that fingers passed. It must also predict contacts to which it was not fitted better than the field
-    does (:mod:`tactile_lab.slam.shape.selection.held_out`).
+    does (:mod:`tactile_lab.slam.shape.selection.held_out`). Of a body into which fingers came down inside a rim,
+    the outside is chosen without what they met and where they were there; what they met tells how thick the wall is.
 
     Args:
         field: the field as a shape, used unless another model is more probable; without a table it keeps all contacts.
@@ -70,6 +72,23 @@ def best_spatial_shape(
         floor_m: height of the table if the object stands on one; only then vertical walls are considered, and the field
             ends at the table like :class:`StandingField`.
     """
+    if floor_m is None or field.log_evidence is None:
+        return _best_solid(field, gpis, best_outline, free_points_m, floor_m)
+    if free_points_m is not None and (entered := are_entered(gpis, free_points_m)).any():
+        inside = felt_inside(gpis, free_points_m[entered])
+        outside = gpis.of_some(np.flatnonzero(~inside)).optimise(max_iterations=_KERNEL_STEPS) if inside.any() else gpis
+        around = GpisShape(outside), outside, best_outline, free_points_m[~entered], floor_m
+        hollow = try_make(lambda: hollowed(_best_solid(*around), gpis, free_points_m, floor_m, inside))
+        if isinstance(hollow, Hollow):
+            return hollow
+    best = _best_solid(field, gpis, best_outline, free_points_m, floor_m)
+    return try_make(lambda: hollowed(best, gpis, free_points_m, floor_m)) or best
+
+
+def _best_solid(
+    field: FittedShape, gpis: Gpis, best_outline: OutlineChoice, free_points_m: Array | None, floor_m: float | None
+) -> FittedShape:
+    """The most probable model; a closed one."""
     if field.log_evidence is None:
         return field
     without = gpis.settings.without
@@ -92,8 +111,7 @@ def best_spatial_shape(
         best, most = _likelier(sectioned := _sectioned(gpis, floor_m), best, most)
         sharp = None if best is sectioned else sharp
     best = _rounder(best, sharp, everything, free_points_m, floor_m, most + left_out_nats)
-    best = _with_missing_parts(best, everything, free_points_m, floor_m)
-    return try_make(lambda: hollowed(best, everything, free_points_m, floor_m)) or best
+    return _with_missing_parts(best, everything, free_points_m, floor_m)
 
 
 def _rounder(

@@ -191,13 +191,13 @@ class _Complex:
 
     def _orient(self, loop: Loop, normal: Array) -> Loop:
         corners = np.array([self.vertices[v] for v in loop])
-        return loop if _area_vector(corners) @ normal > 0 else loop[::-1]
+        return loop if _areas(corners[None])[0] @ normal > 0 else loop[::-1]
 
     def finish(self, normals: Array, offsets_m: Array) -> Arrangement:
         vertices = np.array(self.vertices)
         facets = tuple(facet for facet in self.facets if facet is not None)
         centres = np.array([vertices[self._corners(cell)].mean(axis=0) for cell in self.cells])
-        vectors = np.array([_area_vector(vertices[list(facet.loop)]) for facet in facets])
+        vectors = _area_vectors(vertices, facets)
         return Arrangement(
             vertices_m=vertices,
             facets=facets,
@@ -234,10 +234,28 @@ def _chain(edges: list[tuple[int, int]]) -> Loop:
     return tuple(loop)
 
 
-def _area_vector(corners: Array) -> Array:
-    """Normal of a planar polygon of shape (k, 3), with its area as length."""
-    arms = corners[1:] - corners[0]
-    return np.asarray(0.5 * np.cross(arms[:-1], arms[1:]).sum(axis=0))
+def _area_vectors(vertices: Array, facets: tuple[Facet, ...]) -> Array:
+    """Normals of facets, with their areas as lengths, shape (m, 3)."""
+    counts, vectors = np.array([len(facet.loop) for facet in facets]), np.empty((len(facets), 3))
+    for count in np.unique(counts):
+        alike = np.flatnonzero(counts == count)
+        vectors[alike] = _areas(vertices[np.array([facets[at].loop for at in alike])])
+    return vectors
+
+
+def _areas(corners: Array) -> Array:
+    """Normals of planar polygons of shape (m, k, 3), with their areas as lengths, shape (m, 3).
+
+    A body has tens of thousands of them, for each of which numpy's own cross product takes a tenth of a millisecond.
+    """
+    arms = corners[:, 1:] - corners[:, :1]
+    (ahead, back), (next_ahead, next_back) = _rolled(arms[:, :-1]), _rolled(arms[:, 1:])
+    return np.asarray(0.5 * (ahead * next_back - back * next_ahead).sum(axis=1))
+
+
+def _rolled(vectors: Array) -> tuple[Array, Array]:
+    """Vectors (..., 3) with their components rolled to y, z, x and to z, x, y."""
+    return vectors.take((1, 2, 0), axis=-1), vectors.take((2, 0, 1), axis=-1)
 
 
 def _volumes(vertices: Array, facets: tuple[Facet, ...], vectors: Array, centres: Array) -> Array:

@@ -7,7 +7,7 @@ for the floor, and both are the less certain the deeper they lie.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -48,7 +48,7 @@ class Hollow:
         body: the model whose outside it has.
         outside: the body's surface.
         gpis: the field of all contacts.
-        middle_m: of the rim, shape (3,).
+        middle_m: of the places where fingers were in the cavity, shape (3,).
         wall_m: thickness of the wall.
         rim_m: height of the rim.
         entered_m: lowest height at which a finger was in the cavity.
@@ -84,12 +84,13 @@ class Hollow:
         raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
 
     def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
-        """The surface, no coarser than walls allow; it ends at the table for which it was made.
+        """The surface, no coarser than walls allow, with its lining; it ends at the table for which it was made.
 
         Raises:
             ShapeError: nothing is inside.
         """
-        return extract_mesh(self.field, resolution_m=min(resolution_m, _GRID_m), floor_m=self.floor_m)
+        mesh = extract_mesh(self.field, resolution_m=min(resolution_m, _GRID_m), floor_m=self.floor_m)
+        return replace(mesh, lining=self.field.are_lining(mesh.vertices))
 
     @cached_property
     def field(self) -> _HollowField:
@@ -112,10 +113,7 @@ class _HollowField:
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
         """The field at points of shape (q, 3)."""
         body = self._body.predict(points_m, gradient=gradient, variance=variance)
-        shape, (away_m, inward) = self._shape, self._walls.away(points_m)
-        to_wall_m, to_floor_m = away_m - shape.wall_m, points_m[:, 2] - shape.bottom_m
-        is_wall = to_wall_m < to_floor_m
-        cavity_m = np.where(is_wall, to_wall_m, to_floor_m)
+        cavity_m, is_wall, inward = self._cavity(points_m)
         inside = cavity_m > body.mean_m
         slope, variance_m2 = body.gradient, body.variance_m2
         if gradient:
@@ -125,6 +123,21 @@ class _HollowField:
             variance_m2 = np.where(inside, self._sigma_m(points_m[:, 2], is_wall) ** 2, variance_m2)
         return Prediction(np.where(inside, cavity_m, body.mean_m), slope, variance_m2)
 
+    def are_lining(self, points_m: Array) -> Mask:
+        """Which places of the surface, shape (q, 3), are on the inside of a wall, no deeper than a finger was."""
+        cavity_m, is_wall, _ = self._cavity(points_m)
+        is_inner = cavity_m > self._body.predict(points_m).mean_m
+        return np.asarray(is_inner & is_wall & (points_m[:, 2] > self._shape.entered_m))
+
+    def _cavity(self, points_m: Array) -> tuple[Array, Mask, Array]:
+        """How far places (q, 3) are inside the cavity, whether its wall is nearer than its floor, and the directions
+        away from the wall.
+        """
+        away_m, inward = self._walls.away(points_m)
+        to_wall_m, to_floor_m = away_m - self._shape.wall_m, points_m[:, 2] - self._shape.bottom_m
+        is_wall = to_wall_m < to_floor_m
+        return np.where(is_wall, to_wall_m, to_floor_m), is_wall, inward
+
     def _sigma_m(self, heights_m: Array, is_wall: Mask) -> Array:
         shape = self._shape
         wall_m = np.hypot(_THICKNESS_SIGMA_m, _SIGMA_PER_DEPTH * np.maximum(shape.rim_m - heights_m, 0.0))
@@ -132,18 +145,22 @@ class _HollowField:
         return np.where(is_wall, wall_m, floor_m)
 
 
-def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float) -> FittedShape:
+def hollowed(
+    shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_m: float, inside: Mask | None = None
+) -> FittedShape:
     """A shape with a cavity where fingers went down inside its rim; otherwise the shape itself.
 
     A lid and a cavity contradict one another: the one that less speaks against is believed, places where a finger came
-    down through the lid, or contacts that the cavity leaves off the surface. Walls are those that face away from the
-    middle of the rim: a model that was told of a finger inside may have a dent there.
+    down through the lid, or contacts that the cavity leaves off the surface. Walls are those that face away from where
+    fingers were: a model that was told of them may have a dent there, whose walls face them. The middle of the contacts
+    on the rim need not be in that dent, as the rim may have been touched on one side alone.
 
     Args:
         shape: the most probable model.
         gpis: the field of all contacts.
         free_points_m: places that a finger went through, shape (k, 3), or None.
         floor_m: height of the table.
+        inside: which contacts are on the inside (:func:`felt_inside`), if the model was made without them.
 
     Raises:
         ShapeError: the shape encloses nothing.
@@ -155,17 +172,49 @@ def hollowed(shape: FittedShape, gpis: Gpis, free_points_m: Array | None, floor_
     low_m = free_points_m[free_points_m[:, 2] < rim_m - _BELOW_RIM_m]
     if not len(low_m):
         return shape
-    mesh, middle_m = shape.mesh(_GRID_m, floor_m), gpis.contacts_m[rim].mean(axis=0)
-    body = SolidField(mesh, 0.0)
-    walls = Walls.of(mesh).facing_away(middle_m)
+    mesh = shape.mesh(_GRID_m, floor_m).below(float(gpis.contacts_m[:, 2].max()))
+    body, walls = SolidField(mesh, 0.0), Walls.of(mesh)
     low_m = low_m[_surrounded(low_m, np.vstack([gpis.contacts_m[rim], _near_rim(walls, rim_m)]))]
     entered_m = low_m[_over_solid(low_m, body, (rim_m + floor_m) / 2)]
     if not len(entered_m):
         return shape
-    wall_m = float(np.clip(2 * np.median(walls.distances_m(gpis.contacts_m[rim])), *_THICKNESS_m))
+    middle_m = entered_m.mean(axis=0)
+    walls = walls.facing_away(middle_m)
+    inside_m = np.empty((0, 3)) if inside is None else gpis.contacts_m[inside]
+    wall_m = _thickness_m(walls, gpis.contacts_m[rim], inside_m)
     hollow = Hollow(shape, mesh, gpis, middle_m, wall_m, rim_m, float(entered_m[:, 2].min()), floor_m)
     against = _off(hollow.field, gpis) - _off(body, gpis)
     return hollow if against < len(entered_m) else shape
+
+
+def are_entered(gpis: Gpis, free_points_m: Array) -> Mask:
+    """Which places that a finger went through, shape (k, 3), are below a rim, with contacts on it around them."""
+    high_m = _highest(gpis)
+    entered = np.asarray(free_points_m[:, 2] < high_m[:, 2].max(initial=-np.inf) - _BELOW_RIM_m)
+    entered[entered] = _surrounded(free_points_m[entered], high_m)
+    return entered
+
+
+def felt_inside(gpis: Gpis, entered_m: Array) -> Mask:
+    """Which contacts, shape (n,), are below a rim and face where fingers came down inside it, shape (k, 3), as far as
+    contacts on the rim are around them: those on the near side of a handle face there, too.
+    """
+    points_m, high_m = gpis.contacts_m, _highest(gpis)
+    facing = np.einsum("nk,nk->n", entered_m.mean(axis=0) - points_m, gpis.normals) > 0
+    is_low = points_m[:, 2] < high_m[:, 2].max() - _BELOW_RIM_m
+    return np.asarray(facing & is_low & _surrounded(points_m, high_m))
+
+
+def _highest(gpis: Gpis) -> Array:
+    """The contacts on the rim that are no lower below the highest than fingers must be to be inside, shape (k, 3)."""
+    rim_m = gpis.contacts_m[_on_rim(gpis)]
+    return np.asarray(rim_m[rim_m[:, 2] > rim_m[:, 2].max(initial=-np.inf) - 2 * _BELOW_RIM_m])
+
+
+def _thickness_m(walls: Walls, on_rim_m: Array, inside_m: Array) -> float:
+    """Of a wall, by contacts on its rim, in the middle on average, and on its inside; shapes (q, 3), (k, 3)."""
+    found_m = np.concatenate([2 * walls.distances_m(on_rim_m), walls.distances_m(inside_m)])
+    return float(np.clip(np.median(found_m), *_THICKNESS_m))
 
 
 def _on_rim(gpis: Gpis) -> Mask:
@@ -199,5 +248,5 @@ def _surrounded(places_m: Array, around_m: Array) -> Mask:
     """Which places, seen from above, others surround; shapes (q, 3), (n, 3)."""
     try:
         return np.asarray(Delaunay(around_m[:, :2]).find_simplex(places_m[:, :2]) >= 0)
-    except QhullError:  # they are in a line
+    except (QhullError, ValueError):  # they are in a line, or none
         return np.zeros(len(places_m), dtype=bool)

@@ -73,6 +73,8 @@ class SurfaceMesh:
         is_closed: False if the field has no closed surface and was cut at the largest margin.
         known: of each vertex, whether it was touched nearby, shape (n,); None if that was not determined.
         shared_sigma_m: median of the part of sigma that contacts of one finger share: the same throughout a session.
+        lining: of each vertex, whether it is the inside of a wall of which the rim tells how thick it is, and where a
+            finger was as deep, shape (n,); None without such a wall.
     """
 
     vertices: Array
@@ -82,6 +84,7 @@ class SurfaceMesh:
     is_closed: bool
     known: Mask | None = None
     shared_sigma_m: float = 0.0
+    lining: Mask | None = None
 
     def below(self, top_m: float) -> SurfaceMesh:
         """The surface with what is higher than ``top_m`` pressed down to there."""

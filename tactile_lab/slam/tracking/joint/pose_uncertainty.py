@@ -25,10 +25,10 @@ from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.planar.polygon import Polygon
 from tactile_lab.slam.shape.planar.rounded_outline import RoundedOutline
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, on_walls
 from tactile_lab.slam.shape.surfaces.surface import Contour, RESOLUTION_m, SurfaceMesh

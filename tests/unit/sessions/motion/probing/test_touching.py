@@ -279,6 +279,17 @@ def test_where_a_link_stands_on_the_object_no_fingertip_is_laid_on(
     assert laid_on[-1] == toucher.guard.leans_hard
 
 
+@pytest.mark.parametrize(("met", "higher_m"), [(("links",), 0.05), (("links", "FF"), 0.05), (("FF",), 0.0)])
+def test_what_a_link_met_first_may_be_higher_than_what_fingertips_felt(
+    met: tuple[str, ...], higher_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    motion = motion_on(DiscWorld(disc()))
+    toucher = Toucher(motion, QUICK, TIP)
+    monkeypatch.setattr(toucher.guard, "met", met)
+    toucher.on_top(0.03)
+    assert motion.tallest_m == pytest.approx(0.03 + higher_m)
+
+
 def test_a_tap_tells_what_it_met_even_where_the_hand_has_drawn_back_since(monkeypatch: pytest.MonkeyPatch) -> None:
     toucher = Toucher(motion_on(DiscWorld(disc(0.05))), QUICK, TIP)
     monkeypatch.setattr(toucher, "_lay_on", lambda *_, leans: toucher._motion.rise(0.05, 1.0))

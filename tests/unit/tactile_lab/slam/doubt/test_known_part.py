@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import trimesh
 
 from drivers.core.contacts import Array
+from tactile_lab.experiments.data.household import turned
 from tactile_lab.experiments.data.outlines import OUTLINES_m
 from tactile_lab.slam.doubt.known_part import REACH_m, known_part, with_guesses_told
 from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
@@ -100,6 +103,22 @@ def test_a_surface_that_goes_on_by_symmetry_is_known_only_near_contacts() -> Non
     all_around = ContactSet(low_and_high, np.tile(ring, (2, 1)), np.full(16, 0.001), np.full(16, 0.087))
     assert three < 0.4
     assert known_part(tin, all_around, floor_m=-0.05).share > three + 0.3
+
+
+def test_the_inside_of_a_wall_is_known_where_its_outside_was_touched() -> None:
+    cup = faceted(turned([0, 36, 36, 31, 31, 0], [0, 0, 80, 80, 5, 5]).subdivide_to_size(0.006))
+    outward = np.einsum("nk,nk->n", cup.normals, cup.vertices * [1.0, 1.0, 0.0])
+    lining = (outward < -0.01) & (cup.vertices[:, 2] > 0.04)
+    angles = np.radians([-40.0, -20.0, 0.0, 20.0, 40.0])
+    around = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(5)])
+    places_m = np.concatenate([0.036 * around + [0.0, 0.0, height_m] for height_m in (0.05, 0.07)])
+    contacts = ContactSet(places_m, np.tile(around, (2, 1)), np.full(10, 0.001), np.full(10, 0.087))
+    assert not known_part(cup, contacts, floor_m=0.0).known[outward < -0.01].any()
+    known = known_part(replace(cup, lining=lining), contacts, floor_m=0.0).known
+    assert not known[(outward < -0.01) & ~lining].any()
+    beside = lining & (cup.vertices[:, 0] > 0.025)
+    assert known[beside].all()
+    assert not known[lining & (cup.vertices[:, 0] < -0.01)].any()
 
 
 def test_what_a_finger_went_through_is_not_known() -> None:

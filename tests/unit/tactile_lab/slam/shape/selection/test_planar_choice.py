@@ -7,11 +7,12 @@ import pytest
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.metrics.metrics import contour_errors
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.planar.outlines import is_simple
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape
+from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.surfaces.sampling import polygon_area
 from tests.support.shape_examples import (
     contacts_on_box,

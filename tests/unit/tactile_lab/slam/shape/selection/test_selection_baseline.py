@@ -8,12 +8,13 @@ import trimesh
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.contradictions import stray_cost
 from tactile_lab.slam.shape.selection.held_out import predicts_better
 from tactile_lab.slam.shape.selection.models import fit_shape
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape, free_evidence, outline_of
+from tactile_lab.slam.shape.selection.planar_choice import best_shape, free_evidence, outline_of
 from tactile_lab.slam.shape.selection.spatial_choice import best_spatial_shape
 from tactile_lab.slam.shape.selection.unexplained import are_inside, unexplained
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from drivers.core.poses import rotate, transform_points
 from tactile_lab.experiments.data.spatial_data import simulate
@@ -15,6 +16,7 @@ from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.metrics.metrics import mesh_errors
 from tactile_lab.slam.shape.selection.held_out import predicts_better
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
+from tactile_lab.slam.shape.solids.hollow import Hollow
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism, ear_triangles
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, nearest_on_mesh, polygon_area
@@ -215,3 +217,21 @@ def test_a_solid_of_revolution_that_predicts_contacts_better_stands_before_many_
     assert shape.name == "turned"
     assert Polyhedron.fit(field).log_evidence > shape.log_evidence + 100
     assert mesh_errors(shape.mesh(floor_m=0.0), data.mesh).hausdorff_m < 0.004
+
+
+def test_a_pot_has_flat_walls_as_thick_as_fingers_inside_found_them_though_its_rim_was_touched_near_the_edge() -> None:
+    half_m, wall_m, high_m = np.array([0.045, 0.035]), 0.008, 0.07
+    points_m, normals, up = list[Array](), list[Array](), np.array([0.0, 0.0, 1.0])
+    for out in np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]]):
+        along, reach_m = np.array([-out[1], out[0], 0.0]), float(np.abs(out[:2]) @ half_m)
+        points_m += [reach_m * out + u * along + z * up for u in (-0.02, 0.0, 0.02) for z in (0.02, 0.05)]
+        points_m += [(reach_m - 0.002) * out + u * along + high_m * up for u in (-0.02, 0.015)]
+        points_m += [(reach_m - wall_m) * out + u * along + 0.045 * up for u in (-0.01, 0.0, 0.01)]
+        normals += [out] * 6 + [up] * 2 + [-out] * 3
+    noise_m = np.random.default_rng(1).normal(0, 0.0003, (len(points_m), 3))
+    field = Gpis.fit(np.array(points_m) + noise_m, np.array(normals), POINT_SIGMA_m, NORMAL_SIGMA_rad)
+    free_m = np.array([[0.0, 0.0, 0.04], [0.02, 0.01, 0.04], [-0.02, -0.01, 0.045]])
+    pot = best_shape(field.optimise(max_iterations=10), free_m, 0.0)
+    assert pot.name == "hollow polyhedron"
+    assert isinstance(pot, Hollow)
+    assert pot.wall_m == pytest.approx(wall_m, abs=0.0007)

@@ -9,8 +9,9 @@ import trimesh
 from drivers.core.contacts import Array
 from tactile_lab.experiments.data.household import turned
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.fields.standing_field import StandingField
-from tactile_lab.slam.shape.solids.hollow import Hollow, hollowed
+from tactile_lab.slam.shape.solids.hollow import Hollow, are_entered, felt_inside, hollowed
 from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
@@ -48,6 +49,18 @@ def test_a_cup_is_hollow_where_fingers_went_down_inside_its_rim() -> None:
     assert np.mean(distances_to_mesh(mesh.vertices, CUP)) < 0.0015
 
 
+def test_the_lining_is_the_inside_of_the_wall_as_deep_as_a_finger_was() -> None:
+    hollow = shape_of(felt(RADIUS_m - WALL_m / 2), IN_CUP_m)
+    assert isinstance(hollow, Hollow)
+    mesh = hollow.mesh()
+    assert mesh.lining is not None
+    lining_m = mesh.vertices[mesh.lining]
+    assert np.ptp(np.arctan2(lining_m[:, 1], lining_m[:, 0])) > np.radians(350.0)
+    assert IN_CUP_m[:, 2].min() < lining_m[:, 2].min() < IN_CUP_m[:, 2].min() + 0.004
+    np.testing.assert_allclose(np.hypot(*lining_m[:, :2].T), RADIUS_m - WALL_m, atol=0.003)
+    assert (np.einsum("nk,nk->n", mesh.normals[mesh.lining], lining_m * [1.0, 1.0, 0.0]) < 0).all()
+
+
 def test_a_cup_is_hollow_though_its_rim_was_touched_on_one_side_only() -> None:
     hollow = shape_of(felt(RADIUS_m - WALL_m / 2, on_top=4), IN_CUP_m)
     assert isinstance(hollow, Hollow)
@@ -80,6 +93,42 @@ def test_a_model_that_was_told_of_the_fingers_is_hollow_as_well() -> None:
     hollow = hollowed(dented, field, IN_CUP_m, 0.0)
     assert isinstance(hollow, Hollow)
     assert np.mean(distances_to_mesh(hollow.mesh().vertices, CUP)) < 0.0015
+
+
+def test_a_dent_of_a_model_that_was_told_of_the_fingers_is_no_wall_though_the_rim_was_touched_on_one_side() -> None:
+    field = felt(RADIUS_m - WALL_m / 2, on_top=4)
+    hollow = hollowed(Turned.fit(field, 0.0, IN_CUP_m), field, IN_CUP_m, 0.0)
+    assert isinstance(hollow, Hollow)
+    assert hollow.wall_m == pytest.approx(WALL_m, abs=0.002)
+    assert distances_to_mesh(hollow.mesh().vertices, CUP).max() < 0.006
+
+
+def test_contacts_on_the_inside_of_the_wall_are_known_from_those_behind_a_handle() -> None:
+    around = np.radians([20.0, 110.0, 230.0])
+    out = np.column_stack([np.cos(around), np.sin(around), np.zeros(3)])
+    within_m = (RADIUS_m - 0.009) * out + [0.0, 0.0, 0.055]
+    behind_handle_m = np.array([[RADIUS_m + 0.02, 0.0, 0.055]])
+    cup = felt(RADIUS_m - WALL_m / 2)
+    points_m = np.vstack([cup.contacts_m, within_m, behind_handle_m])
+    normals = np.vstack([cup.normals, -out, [[-1.0, 0.0, 0.0]]])
+    inside = felt_inside(Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad), IN_CUP_m)
+    assert np.flatnonzero(inside).tolist() == [len(cup.contacts_m) + at for at in range(3)]
+    assert not felt_inside(cup, IN_CUP_m).any()
+
+
+def test_fingers_were_inside_where_contacts_on_the_rim_are_around_them() -> None:
+    beside_m = np.array([[0.05, 0.0, 0.05], [0.0, 0.0, 0.078], [0.0, 0.0, 0.09]])
+    for on_top, inside in ((10, [True, True, True]), (2, [False, False, False]), (0, [False, False, False])):
+        entered = are_entered(felt(RADIUS_m - WALL_m / 2, on_top), np.vstack([IN_CUP_m, beside_m]))
+        assert entered.tolist() == [*inside, False, False, False]
+
+
+def test_nothing_of_a_hollow_body_is_higher_than_what_was_touched() -> None:
+    field = felt(RADIUS_m - WALL_m / 2, on_top=3)
+    assert GpisShape(field).mesh().vertices[:, 2].max() > HIGH_m + 0.003
+    hollow = hollowed(GpisShape(field), field, IN_CUP_m, 0.0)
+    assert isinstance(hollow, Hollow)
+    assert hollow.mesh().vertices[:, 2].max() < HIGH_m + 0.002
 
 
 def test_a_cavity_is_the_less_certain_the_deeper_it_is() -> None:

@@ -9,10 +9,11 @@ import trimesh
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.fields.observations import fibonacci_sphere
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.model import FittedShape
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape, polygon_of
+from tactile_lab.slam.shape.selection.planar_choice import polygon_of
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism, ear_triangles, on_walls
 from tactile_lab.slam.shape.solids.solid_field import SolidField, TabulatedSolid

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from drivers.core.contacts import Array, StepSigma
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.model import FittedShape
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape
+from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh

@@ -10,10 +10,11 @@ import pytest
 
 from drivers.core.contacts import Array
 from tactile_lab.experiments.data import spatial_data
+from tactile_lab.slam.shape.fields.gpis_shape import GpisShape
 from tactile_lab.slam.shape.fields.settings import GpisSettings
 from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.planar.polygon import Polygon
-from tactile_lab.slam.shape.selection.planar_choice import GpisShape, best_shape
+from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.planes import fit_planes, weighted_contacts
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.prism import Prism
