@@ -82,9 +82,9 @@ class Toucher:
     def on_top(self, height_m: float) -> None:
         """The top was looked for, and nothing taller found: the first approach has ended well.
 
-        Where a link has landed, fingertips may have been inside a rim, and the rim is higher.
+        Where a link alone has landed, fingertips may have been inside a rim, and the rim is higher.
         """
-        self.expect_tallest(height_m + (_FINGER_END_m if LINKS in self.guard.met else 0.0))
+        self.expect_tallest(height_m + (_FINGER_END_m if self.guard.met == (LINKS,) else 0.0))
         self._motion.supervisor.on_approach()
 
     def tap(self, frame: GraspFrame, below_top_m: float = np.inf) -> Array:
