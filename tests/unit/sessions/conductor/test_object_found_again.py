@@ -31,7 +31,7 @@ class Falling:
 
 def run(after: Disc | None, grasps: int, watcher: Watcher) -> tuple[SessionOutcome, DiscWorld, TactileSlam]:
     world = DiscWorld(Disc(np.zeros(2), 0.03, STANDING_m), Falling(after))
-    slam = TactileSlam(SlamSettings(dimension=3, particles=200), seed=1)
+    slam = TactileSlam(SlamSettings(dimension=3, shape_model="gpis"), seed=1)
     wanted = settings(grasps, probing={"highest_m": 0.2})
     roles = autonomous_roles(world, slam, wanted, seed=3, dimension=3)  # type: ignore[arg-type]
     return Conductor(world, wanted, roles, watcher).run(), world, slam  # type: ignore[arg-type]

@@ -16,7 +16,7 @@ TOP_m = 0.10
 def reached(mesh: trimesh.Trimesh, yaws_rad: tuple[float, float] = ANY_YAW_rad) -> tuple[Array, Array, Mask]:
     """Places of a surface whose foot is at zero, their normals, and which of them are in reach."""
     mesh.apply_translation([0.0, 0.0, -mesh.bounds[0][2]])
-    points_m, normals = sample_mesh_with_normals(mesh, 300)
+    points_m, normals = sample_mesh_with_normals(mesh, 120)
     return points_m, normals, are_in_reach(mesh, points_m, normals, [yaws_rad], HandShape())
 
 

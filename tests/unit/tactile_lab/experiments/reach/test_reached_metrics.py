@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 import trimesh
 
+from tactile_lab.experiments.reach import reached_metrics
 from tactile_lab.experiments.reach.reached_metrics import NOTHING_KNOWN, reach_figures
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
+
+
+@pytest.fixture(autouse=True)
+def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each costs a look at every posture of the hand."""
+    monkeypatch.setattr(reached_metrics, "_PLACES", 300)
 
 
 def box(wider_m: float = 0.0) -> trimesh.Trimesh:
