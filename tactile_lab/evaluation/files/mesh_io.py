@@ -31,7 +31,8 @@ _GUESS = np.append(UNKNOWN, 255.0)
 
 
 def read_mesh(path: Path | str) -> trimesh.Trimesh:
-    """Read a closed mesh in metres (PLY, STL, OBJ, GLB); equal vertices are merged, faces turned outward.
+    """Read a closed mesh in metres (PLY, STL, OBJ, GLB), its faces turned outward; in one whose faces do not share their
+    vertices, equal ones are merged.
 
     Raises:
         ShapeError: missing or unreadable file, no faces, coordinates that are not numbers, not closed, or an
@@ -46,7 +47,8 @@ def read_mesh(path: Path | str) -> trimesh.Trimesh:
     if not SMALLEST_EXTENT_m <= extent_m <= LARGEST_EXTENT_m:
         hint = "Coordinates are metres; are these millimetres?" if extent_m > 1 else "Coordinates are metres"
         raise ShapeError(f"is {extent_m:.4g} m long", where=str(path), hint=hint)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    if not mesh.is_watertight:  # of one that is closed, places that happen to be the same would be torn open
+        mesh.merge_vertices(merge_tex=True, merge_norm=True)
     if not mesh.is_watertight:
         raise ShapeError(
             f"is not closed ({_open_edge_count(mesh)} open edges)", where=str(path), hint="Close its holes first"
@@ -77,7 +79,7 @@ def read_estimated_mesh(path: Path | str) -> EstimatedMesh:
         ShapeError: as :func:`read_mesh`, or a mesh without standard deviations.
     """
     mesh = read_mesh(path)
-    written = mesh.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")  # reading merges equal vertices
+    written = mesh.metadata.get("_ply_raw", {}).get("vertex", {}).get("data")  # reading may merge equal vertices
     if written is None or "sigma_m" not in (written.dtype.names or ()):
         raise ShapeError(
             "contains no standard deviations", where=str(path), hint="Replay the session to renew its results"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +42,16 @@ def test_glb_is_read_back_closed_with_its_colours(surface: SurfaceMesh, tmp_path
     content = (tmp_path / "mesh.glb").read_bytes()
     description = json.loads(content[20 : 20 + int.from_bytes(content[12:16], "little")])
     assert {"POSITION", "NORMAL", "COLOR_0"} <= set(description["meshes"][0]["primitives"][0]["attributes"])
+
+
+def test_a_closed_mesh_stays_closed_where_two_of_its_vertices_are_at_one_place(
+    surface: SurfaceMesh, tmp_path: Path
+) -> None:
+    one, other = surface.faces[0, :2]
+    vertices = surface.vertices.copy()
+    vertices[other] = vertices[one]
+    write_ply(tmp_path / "mesh.ply", replace(surface, vertices=vertices))
+    assert len(read_mesh(tmp_path / "mesh.ply").vertices) == len(vertices)
 
 
 WRITE_BOTH = """
