@@ -31,8 +31,8 @@ _GUESS = np.append(UNKNOWN, 255.0)
 
 
 def read_mesh(path: Path | str) -> trimesh.Trimesh:
-    """Read a closed mesh in metres (PLY, STL, OBJ, GLB), its faces turned outward; in one whose faces do not share their
-    vertices, equal ones are merged.
+    """Read a closed mesh in metres (PLY, STL, OBJ, GLB), its faces turned outward; equal vertices are merged where its
+    faces do not share them.
 
     Raises:
         ShapeError: missing or unreadable file, no faces, coordinates that are not numbers, not closed, or an
