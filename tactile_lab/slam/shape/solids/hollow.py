@@ -180,8 +180,8 @@ def hollowed(
         return shape
     middle_m = entered_m.mean(axis=0)
     walls = walls.facing_away(middle_m)
-    inside_m = np.empty((0, 3)) if inside is None else gpis.contacts_m[inside]
-    wall_m = _thickness_m(walls, gpis.contacts_m[rim], inside_m)
+    inside = np.zeros_like(rim) if inside is None else inside
+    wall_m = _thickness_m(walls, gpis.contacts_m[rim & ~inside], gpis.contacts_m[inside])
     hollow = Hollow(shape, mesh, gpis, middle_m, wall_m, rim_m, float(entered_m[:, 2].min()), floor_m)
     against = _off(hollow.field, gpis) - _off(body, gpis)
     return hollow if against < len(entered_m) else shape
