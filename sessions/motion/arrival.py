@@ -68,7 +68,9 @@ class Arrival:
         """
         s, guard, motion = self._settings, self._landing, self._motion
         inside_m = lowest_inside_m(place.table.name, place.table.height_m, self._hand)
-        tips_m, links_m = np.minimum(self._slower_from_m(place.table, inside_m), self.short_of_m(place))
+        tips_m = self._tips_from_m(place.table)
+        links_m = float(np.clip(top_at_most_m(motion) + _LINKS_NEAR_m - inside_m, 0.0, tips_m))
+        tips_m, links_m = np.minimum((tips_m, links_m), self.short_of_m(place))
         for above_m, speed_m_s in ((tips_m, s.descent_m_s), (links_m, s.landing_m_s), (0.0, s.links_landing_m_s)):
             guard.restart()
             if not motion.probe_base(motion.base_joints(place.frame, place.table, above_m), speed_m_s, guard.is_met):
@@ -80,17 +82,14 @@ class Arrival:
 
     def come_up(self, place: Place) -> None:
         """As far as fingertips may be beside the object, slowly: one may be under a rim."""
-        s, motion = self._settings, self._motion
-        inside_m = lowest_inside_m(place.table.name, place.table.height_m, self._hand)
-        tips_m, _ = self._slower_from_m(place.table, inside_m)
+        s, motion, tips_m = self._settings, self._motion, self._tips_from_m(place.table)
         if self.short_of_m(place) < tips_m:
             motion.move_base(motion.base_joints(place.frame, place.table, tips_m), s.approach_m_s, s.turn_rad_s)
 
-    def _slower_from_m(self, table: Closing, inside_m: float) -> tuple[float, float]:
-        """How far above the grasp the tips may meet the top, and links of which the lowest will be at ``inside_m``."""
-        top_m, opened = top_at_most_m(self._motion), open_hand(table.name, table.height_m, self._hand)
-        tips_m = max(0.0, top_m + self._settings.touch.near_m - opened.lowest_m)
-        return tips_m, float(np.clip(top_m + _LINKS_NEAR_m - inside_m, 0.0, tips_m))
+    def _tips_from_m(self, table: Closing) -> float:
+        """How far above the grasp the tips may meet the top."""
+        opened = open_hand(table.name, table.height_m, self._hand)
+        return max(0.0, top_at_most_m(self._motion) + self._settings.touch.near_m - opened.lowest_m)
 
     def short_of_m(self, place: Place) -> float:
         """How far the hand is from there."""
