@@ -17,6 +17,7 @@ from sessions.perception.carrying.friction_balance import Balance, Friction, Mea
 from sessions.perception.carrying.lifted import dropped_m, lifted_motions, raised
 from sessions.perception.carrying.planar_motions import displacements, planar_matrices
 from sessions.perception.carrying.resistance import Resistance
+from sessions.perception.carrying.resting import at_rest
 from sessions.perception.carrying.roundness import Roundness
 from sessions.perception.carrying.tilt import tilt_rad
 from sessions.perception.carrying.tip_steps import TipSteps, tip_steps
@@ -163,7 +164,8 @@ class CarryOdometry:
         balance, usual = Balance.of(steps), self.friction
         best = balance.solve([usual], _ITERATIONS)[0]
         others = balance.solve(_other_assumptions(usual, self.measured), _ITERATIONS_OF_OTHERS, best)
-        answers = np.concatenate([best[None], others])
+        answers = np.concatenate([best[None], others, best[None]])
+        answers[:-1, at_rest(steps, usual)] = 0.0
         if (up := raised(steps)).any():
             answers[:, up] = lifted_motions(steps, up, balance.centres_m, usual)
         motions = compose_steps(answers, balance.centres_m)
@@ -207,37 +209,38 @@ class CarryOdometry:
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
         noise, held = self.noise, Roundness.of(steps, balance)
         far_m, far_rad, turned_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2], abs(slip[2])
-        slipped_m, missing = float(np.hypot(*slip[:2])), _missing(steps)
-        while_held_m = noise.least_m + noise.spread_m * far_m + noise.slip_m * slipped_m
+        while_held_m = noise.least_m + noise.spread_m * far_m + noise.slip_m * float(np.hypot(*slip[:2]))
         while_held_rad = noise.least_rad + noise.spread_rad * far_rad + noise.turned_rad * turned_rad**2
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
         parts_m = [
             while_held_m,
-            noise.missing_m * slipped_m * missing,
             noise.roll_m * held.overhang,
+            noise.lifted_m_N * _held_up_N(steps),
             noise.pushed_m_N * pushed_N,
             noise.unseen * unseen[0],
         ]
         parts_rad = [
             while_held_rad,
-            noise.missing_rad * turned_rad * missing,
+            noise.missing_rad * turned_rad * _missing(steps),
             noise.round_rad * float(held.turns @ steps.palm_turns_rad),
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],
         ]
         rotation_rad = float(np.linalg.norm(parts_rad))
-        translation_m = float(np.linalg.norm([*parts_m, self._aside_m(missing) * rotation_rad]))
+        translation_m = float(np.linalg.norm([*parts_m, noise.aside * self.friction.half_width_m * rotation_rad]))
         return StepSigma(self._scale * translation_m, self._scale * rotation_rad)
-
-    def _aside_m(self, missing: float) -> float:
-        """How far from the object's middle the point may be about which it turns: far where few contacts hold it."""
-        return self.friction.half_width_m * min(self.noise.aside + self.noise.aside_missing * missing, 1.0)
 
 
 def _missing(steps: TipSteps) -> float:
     """How many of the five fingertips did not hold the object, in the mean: each that does checks its turn."""
     return len(FINGERS) - float(steps.felt.sum(axis=1).mean())
+
+
+def _held_up_N(steps: TipSteps) -> float:
+    """Upward force of the fingertips while the hand is not raised."""
+    low = ~raised(steps)
+    return max(float(np.median(steps.net_forces_N[low, 2])), 0.0) if low.any() else 0.0
 
 
 def _other_assumptions(usual: Friction, measured: MeasuredFriction) -> Sequence[Friction]:

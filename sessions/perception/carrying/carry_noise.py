@@ -29,7 +29,7 @@ UNPUSHED = LinkTimes()
 @dataclass(frozen=True)
 class CarryNoise:
     """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83,
-    121, 144, 153, 158).
+    121, 144, 153, 158, 163).
 
     Attributes:
         least_m, least_rad: of any carry.
@@ -37,12 +37,11 @@ class CarryNoise:
         slip_m: share of the slip itself.
         turned_rad: of the square of the turn by which it slipped: contacts that slide far are not where the balance
             has them.
-        missing_m, missing_rad: share of the slip, and of the turn by which it slipped, for each fingertip of five that
-            did not hold it.
-        aside, aside_missing: how far from its middle the point may be about which the object turns, as shares of its
-            half width: of any carry, and for each fingertip of five that did not hold it; a half width at most.
+        missing_rad: share of the turn by which it slipped, for each fingertip of five that did not hold it.
+        aside: how far from its middle the point may be about which the object turns, as a share of its half width.
         round_rad: share of the hand's turn that a round object may be off by, over the fingertips beyond two.
         roll_m: how far an object whose sides face down rolls or rocks when it is let go and grasped, over the sine.
+        lifted_m_N: the same for each newton with which fingertips beside it hold it up.
         let_go_rad_N: how the opening hand turns the object, for each newton with which it still pressed.
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
@@ -54,18 +53,17 @@ class CarryNoise:
             object resisted.
     """
 
-    least_m: float = 0.00017
+    least_m: float = 0.0001
     least_rad: float = float(np.deg2rad(0.17))
-    spread_m: float = 0.42
+    spread_m: float = 0.55
     spread_rad: float = 0.12
-    slip_m: float = 0.024
+    slip_m: float = 0.03
     turned_rad: float = 0.8
-    missing_m: float = 0.05
     missing_rad: float = 0.15
-    aside: float = 0.1
-    aside_missing: float = 0.3
+    aside: float = 0.33
     round_rad: float = 0.07
-    roll_m: float = 0.0039
+    roll_m: float = 0.0021
+    lifted_m_N: float = 0.00075
     let_go_rad_N: float = float(np.deg2rad(0.05))
     pushed_m_N: float = 0.001
     pushed_rad_N: float = float(np.deg2rad(0.5))

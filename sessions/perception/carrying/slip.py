@@ -12,6 +12,7 @@ from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.friction_balance import Balance, Friction, compose_steps
 from sessions.perception.carrying.planar_motions import displacements, planar_matrices
+from sessions.perception.carrying.resting import at_rest
 from sessions.perception.carrying.tip_steps import tip_steps
 
 _ITERATIONS = 5
@@ -43,7 +44,9 @@ def slip(
     if not len(steps):
         return None
     balance = Balance.of(steps)
-    moved = compose_steps(balance.solve([friction], _ITERATIONS), balance.centres_m)[0]
+    motions = balance.solve([friction], _ITERATIONS)[0]
+    motions[at_rest(steps, friction)] = 0.0
+    moved = compose_steps(motions, balance.centres_m)
     palm = planar_matrices(steps.world_T_palm[[0, -1]])[0]
     far_x, far_y, turned = displacements(np.linalg.inv(palm) @ moved, balance.centres_m[0])
     return Slip(float(np.hypot(far_x, far_y)), float(abs(turned)))

@@ -40,7 +40,7 @@ def test_a_table_holds_it_back_by_no_more_than_the_creep(contacts):
     assert millimetres < 2.0
     assert degrees < 3.0
     assert carry.problems == ()
-    assert millimetres < 3.3e3 * carry.sigma.translation_m
+    assert millimetres < 3.5e3 * carry.sigma.translation_m
     assert degrees < 3 * np.degrees(carry.sigma.rotation_rad)
 
 
@@ -147,12 +147,20 @@ def test_a_jam_is_told_of_few_steps_and_what_is_around_them_is_not_believed():
     assert jammed.sigma.rotation_rad > sure.rotation_rad + 0.04 * TURN.theta()
 
 
-def test_an_object_may_be_off_its_contacts_by_more_the_fewer_hold_it():
-    """Its turn is about their middle: what is not known of it moves the object's own middle."""
-    sigmas = [odometry().carry(carried(DISC, object_motion=TURN, palm_motion=TURN, felt=felt)).sigma for felt in _HOLDS]
-    extra_m = [0.04 * sigma.rotation_rad / len(felt) for sigma, felt in zip(sigmas, _HOLDS, strict=True)]
-    assert all(sigma.translation_m >= extra for sigma, extra in zip(sigmas, extra_m, strict=True))
-    assert extra_m[0] > 2 * extra_m[1]
+def test_what_is_not_known_of_a_turn_moves_the_objects_middle():
+    """It turns about the middle of its contacts; the fewer hold it, the less is known of that."""
+    few, all_five = (
+        odometry().carry(carried(DISC, object_motion=TURN, palm_motion=TURN, felt=felt)).sigma for felt in _HOLDS
+    )
+    assert few.translation_m > 0.01 * few.rotation_rad
+    assert few.translation_m > all_five.translation_m
+
+
+def test_what_the_fingertips_hold_up_may_roll_when_it_is_let_go_of():
+    steps = carried(BOX, object_motion=TURN, palm_motion=TURN)
+    flat = odometry().carry(steps).sigma
+    steps.net_forces_N[:, 2] = 1.0
+    assert odometry().carry(steps).sigma.translation_m > flat.translation_m + 3e-4
 
 
 def test_fingers_that_feel_nothing_go_on_closing_and_may_push_the_object():
