@@ -33,6 +33,15 @@ _BELOW_RIM_m, _WITHIN_m = 0.004, 0.008
 neck, over a shoulder.
 """
 
+_LOW = 0.25
+"""Share of the height at which that is asked: a model has a dent of its own where rims lean inward."""
+
+_ALIKE_rad = float(np.deg2rad(60.0))
+"""A rim is about as far from its middle in directions that differ by less."""
+
+_FINGER_m = 0.008
+"""Fingertips outside a wall that leans over them come no nearer than that."""
+
 _RIM_WALL_m, _GRID_m = 0.008, 0.003
 _THICKNESS_m, _LEAST_FLOOR_m = (0.004, THICKEST_m), 0.006
 """Of walls, none so thin that the grid misses it, and least thickness of the floor."""
@@ -175,7 +184,7 @@ def hollowed(
     mesh = shape.mesh(_GRID_m, floor_m).below(float(gpis.contacts_m[:, 2].max()))
     body, walls = SolidField(mesh, 0.0), Walls.of(mesh)
     low_m = low_m[_surrounded(low_m, np.vstack([gpis.contacts_m[rim], _near_rim(walls, rim_m)]))]
-    entered_m = low_m[_over_solid(low_m, body, (rim_m + floor_m) / 2)]
+    entered_m = low_m[_over_solid(low_m, body, floor_m + _LOW * (rim_m - floor_m))]
     if not len(entered_m):
         return shape
     middle_m = entered_m.mean(axis=0)
@@ -188,21 +197,37 @@ def hollowed(
 
 
 def are_entered(gpis: Gpis, free_points_m: Array) -> Mask:
-    """Which places that a finger went through, shape (k, 3), are below a rim, with contacts on it around them."""
+    """Which places that a finger went through, shape (k, 3), are below a rim, with contacts on it around them, or by a
+    fingertip's width nearer to those than the rim is in their direction.
+    """
     high_m = _highest(gpis)
-    entered = np.asarray(free_points_m[:, 2] < high_m[:, 2].max(initial=-np.inf) - _BELOW_RIM_m)
-    entered[entered] = _surrounded(free_points_m[entered], high_m)
+    low = np.asarray(free_points_m[:, 2] < high_m[:, 2].max(initial=-np.inf) - _BELOW_RIM_m)
+    entered = low.copy()
+    entered[low] = _surrounded(free_points_m[low], high_m)
+    if entered.any():
+        entered[low] |= _within(free_points_m[low], high_m, free_points_m[entered].mean(axis=0), _FINGER_m)
     return entered
 
 
 def felt_inside(gpis: Gpis, entered_m: Array) -> Mask:
-    """Which contacts, shape (n,), are below a rim and face where fingers came down inside it, shape (k, 3), as far as
-    contacts on the rim are around them: those on the near side of a handle face there, too.
+    """Which contacts, shape (n,), are below a rim and face where fingers came down inside it, shape (k, 3), no farther
+    from there than the rim is in their direction: those on the near side of a handle face there, too.
     """
-    points_m, high_m = gpis.contacts_m, _highest(gpis)
-    facing = np.einsum("nk,nk->n", entered_m.mean(axis=0) - points_m, gpis.normals) > 0
+    points_m, high_m, middle_m = gpis.contacts_m, _highest(gpis), entered_m.mean(axis=0)
+    facing = np.einsum("nk,nk->n", (middle_m - points_m)[:, :2], gpis.normals[:, :2]) > 0
+    facing |= gpis.normals[:, 2] > _UPWARD
     is_low = points_m[:, 2] < high_m[:, 2].max() - _BELOW_RIM_m
-    return np.asarray(facing & is_low & _surrounded(points_m, high_m))
+    return np.asarray(facing & is_low & _within(points_m, high_m, middle_m))
+
+
+def _within(places_m: Array, rim_m: Array, middle_m: Array, by_m: float = 0.0) -> Mask:
+    """Which places, seen from above, are nearer to a middle than the rim in their direction, shapes (q, 3), (n, 3) and
+    (3,); none where the rim is not known in about that direction.
+    """
+    away_m, around_m = ((each - middle_m)[:, :2] @ [1.0, 1.0j] for each in (places_m, rim_m))
+    is_known = (np.abs(np.angle(away_m[:, None] * around_m.conj())) < _ALIKE_rad).any(axis=1)
+    there_m = np.interp(np.angle(away_m), np.angle(around_m), np.abs(around_m), period=2 * np.pi)
+    return np.asarray(is_known & (np.abs(away_m) < there_m - by_m))
 
 
 def _highest(gpis: Gpis) -> Array:

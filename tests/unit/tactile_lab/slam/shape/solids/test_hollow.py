@@ -116,6 +116,34 @@ def test_contacts_on_the_inside_of_the_wall_are_known_from_those_behind_a_handle
     assert not felt_inside(cup, IN_CUP_m).any()
 
 
+def test_a_contact_on_the_inside_is_known_beyond_the_chords_between_contacts_on_the_rim() -> None:
+    cup, between = felt(RADIUS_m - WALL_m / 2), np.radians(18.0)
+    out = np.array([np.cos(between), np.sin(between), 0.0])
+    near_m = (RADIUS_m - WALL_m + 0.0014) * out + [0.0, 0.0, 0.06]
+    points_m, normals = np.vstack([cup.contacts_m, near_m]), np.vstack([cup.normals, -out])
+    inside = felt_inside(Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad), IN_CUP_m)
+    assert np.flatnonzero(inside).tolist() == [len(cup.contacts_m)]
+
+
+def test_a_bowl_whose_rim_leans_inward_is_hollow_though_its_model_has_a_dent() -> None:
+    """Contacts on a round rim face inward, and the profile goes on down to half of the height."""
+    around = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    out = np.column_stack([np.cos(around), np.sin(around), np.zeros(12)])
+    points_m = np.vstack(
+        [r * out + [0, 0, z] for r, z in ((0.050, 0.02), (0.055, 0.035), (0.058, 0.047), (0.055, 0.05))]
+    )
+    up = np.array([0.0, 0.0, 1.0])
+    normals = np.vstack([0.92 * out - 0.39 * up, 0.95 * out - 0.31 * up, out, 0.66 * up - 0.75 * out])
+    normals[-12::2] = 0.75 * up - 0.66 * out[::2]
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    field = Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
+    free_m = np.array([[0.0, 0.0, 0.04], [0.01, 0.0, 0.035], [-0.01, 0.01, 0.04]])
+    dented = Turned.fit(field, 0.0)
+    middle = dented.mesh().vertices
+    assert middle[np.hypot(*middle[:, :2].T) < 0.01, 2].max() < 0.035
+    assert isinstance(hollowed(dented, field, free_m, 0.0), Hollow)
+
+
 def test_fingers_were_inside_where_contacts_on_the_rim_are_around_them() -> None:
     beside_m = np.array([[0.05, 0.0, 0.05], [0.0, 0.0, 0.078], [0.0, 0.0, 0.09]])
     for on_top, inside in ((10, [True, True, True]), (2, [False, False, False]), (0, [False, False, False])):
