@@ -164,7 +164,7 @@ class CarryOdometry:
         balance, usual = Balance.of(steps), self.friction
         best = balance.solve([usual], _ITERATIONS)[0]
         others = balance.solve(_other_assumptions(usual, self.measured), _ITERATIONS_OF_OTHERS, best)
-        answers = np.concatenate([best[None], others, best[None]])
+        answers = np.concatenate([best[None], others, best[None]])  # the last one knows no rest
         answers[:-1, at_rest(steps, usual)] = 0.0
         if (up := raised(steps)).any():
             answers[:, up] = lifted_motions(steps, up, balance.centres_m, usual)

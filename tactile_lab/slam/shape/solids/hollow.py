@@ -197,8 +197,8 @@ def hollowed(
 
 
 def are_entered(gpis: Gpis, free_points_m: Array) -> Mask:
-    """Which places that a finger went through, shape (k, 3), are below a rim, with contacts on it around them, or by a
-    fingertip's width nearer to those than the rim is in their direction.
+    """Which places that a finger went through, shape (k, 3), are below a rim, with contacts on it around them, or no
+    farther from such places than a fingertip's width inside the rim in their direction.
     """
     high_m = _highest(gpis)
     low = np.asarray(free_points_m[:, 2] < high_m[:, 2].max(initial=-np.inf) - _BELOW_RIM_m)
@@ -210,8 +210,8 @@ def are_entered(gpis: Gpis, free_points_m: Array) -> Mask:
 
 
 def felt_inside(gpis: Gpis, entered_m: Array) -> Mask:
-    """Which contacts, shape (n,), are below a rim and face where fingers came down inside it, shape (k, 3), no farther
-    from there than the rim is in their direction: those on the near side of a handle face there, too.
+    """Which contacts, shape (n,), are below a rim and face up, or where fingers came down inside it, shape (k, 3), and
+    are no farther from there than the rim in their direction: those on the near side of a handle face there, too.
     """
     points_m, high_m, middle_m = gpis.contacts_m, _highest(gpis), entered_m.mean(axis=0)
     facing = np.einsum("nk,nk->n", (middle_m - points_m)[:, :2], gpis.normals[:, :2]) > 0
