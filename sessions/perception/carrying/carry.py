@@ -265,7 +265,7 @@ def _sliding_ratios(steps: TipSteps, sliding_m: Array) -> Array:
 
 def _pushed_N(steps: TipSteps) -> float:
     """Net force of the fingertips beyond what a table's friction explains, N."""
-    net_N = np.sort(np.hypot(steps.net_forces_N[:, 0], steps.net_forces_N[:, 1]))
+    net_N = np.sort(steps.pushed_N)
     return max(float(net_N[int(_PUSHED_SHARE * (len(net_N) - 1))]) - _USUAL_NET_N, 0.0)
 
 

@@ -45,15 +45,14 @@ class Resistance:
     @classmethod
     def of(cls, steps: TipSteps, table: Friction) -> Self:
         """Of the steps of a carry; ``table`` is what is known of the friction on it."""
-        pushed_N = np.linalg.norm(steps.net_forces_N[:, :2], axis=1)
         levers_m = np.maximum(steps.levers_m, _LEAST_LEVER_m)
-        pushes_N = np.column_stack([pushed_N, np.abs(steps.moments_Nm) / levers_m])
+        pushes_N = np.column_stack([steps.pushed_N, np.abs(steps.moments_Nm) / levers_m])
         usual_N = np.column_stack([np.ones(len(steps)), table.foot_m / levers_m])
         pressed_N = np.maximum(steps.forces_N.sum(axis=1), 1e-9)[:, None]
         beyond = np.maximum(pushes_N - max(table.table_N, Friction.table_N) * usual_N, 0.0) / pressed_N
         resistance = np.maximum(_doubt(beyond[:, 0], _BEYOND_SHARES), _doubt(beyond[:, 1], _BEYOND_TURNS))
         resists = _long_enough((resistance > _RESISTS) & (steps.felt.sum(axis=1) > 1), steps)
-        near_cones = _doubt(pushed_N / pressed_N[:, 0], _CONE_SHARES)
+        near_cones = _doubt(steps.pushed_N / pressed_N[:, 0], _CONE_SHARES)
         doubt = np.maximum.reduce([resistance, maximum_filter1d(resists, _AROUND), near_cones])
         return cls(doubt, float(pushes_N.max(axis=1)[resists].mean()) if resists.any() else 0.0)
 

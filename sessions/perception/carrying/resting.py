@@ -28,7 +28,7 @@ def at_rest(steps: TipSteps, friction: Friction) -> NDArray[np.bool_]:
     """In which steps the object stays where it is, shape (n,): pressed lightly, and pushed with less than the table
     resists.
     """
-    pushed_N = np.linalg.norm([*steps.net_forces_N[:, :2].T, steps.moments_Nm / friction.foot_m], axis=0)
+    pushed_N = np.hypot(steps.pushed_N, steps.moments_Nm / friction.foot_m)
     pressed_N = steps.forces_N.sum(axis=1)
     resisted_N = min(friction.table_N, float(np.quantile(pushed_N, _DRAGGED)))
     return np.asarray((pushed_N < _HELD_BELOW * resisted_N) & (pressed_N < _LIGHTLY * np.quantile(pressed_N, _MOST)))

@@ -77,6 +77,11 @@ class TipSteps:
         """Which fingers have a contact, shape (n, 5)."""
         return np.asarray(self.forces_N > 0.0)
 
+    @property
+    def pushed_N(self) -> Array:
+        """Horizontal force of all fingertips on the object, shape (n,)."""
+        return np.asarray(np.hypot(self.net_forces_N[:, 0], self.net_forces_N[:, 1]))
+
     @cached_property
     def palm_moves(self) -> Array:
         """The palm's motion on the table in each step, homogeneous matrices, shape (n, 3, 3)."""

@@ -201,11 +201,12 @@ def are_entered(gpis: Gpis, free_points_m: Array) -> Mask:
     farther from such places than a fingertip's width inside the rim in their direction.
     """
     high_m = _highest(gpis)
-    low = np.asarray(free_points_m[:, 2] < high_m[:, 2].max(initial=-np.inf) - _BELOW_RIM_m)
-    entered = low.copy()
-    entered[low] = _surrounded(free_points_m[low], high_m)
-    if entered.any():
-        entered[low] |= _within(free_points_m[low], high_m, free_points_m[entered].mean(axis=0), _FINGER_m)
+    entered = np.asarray(free_points_m[:, 2] < high_m[:, 2].max(initial=-np.inf) - _BELOW_RIM_m)
+    low_m = free_points_m[entered]
+    inside = _surrounded(low_m, high_m)
+    if inside.any():
+        inside |= _within(low_m, high_m, low_m[inside].mean(axis=0), _FINGER_m)
+    entered[entered] = inside
     return entered
 
 
