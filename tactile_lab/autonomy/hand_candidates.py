@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import TypeAlias
 
 import numpy as np
 from gtsam import Pose2
@@ -29,13 +28,10 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
 from sessions.motion.safety import SafetySettings
 from tactile_lab.autonomy.collision_check import links_are_clear, standing
-from tactile_lab.autonomy.heuristic_planner import PlanSettings
+from tactile_lab.autonomy.heuristic_planner import HasRoom, PlanSettings, anywhere
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, closing_rays
 from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays
 from tactile_lab.slam.tracking.contacts.contact_set import planar_rotation
-
-HasRoom: TypeAlias = Callable[[GraspPlan], bool]
-"""Whether a plan is free of obstacles that only the session knows."""
 
 _TAP_FROM_m = 0.025
 """Height above the object's top at which the rays of a tap start."""
@@ -97,11 +93,6 @@ class HandLimits:
     def side_closings(self) -> tuple[str, ...]:
         """Closings with the hand leaning; none for a contour, which has a single height."""
         return () if self.dimension == 2 else self.exploration.side_closings
-
-
-def anywhere(plan: GraspPlan) -> bool:
-    """No obstacle for any plan."""
-    return True
 
 
 def offer(

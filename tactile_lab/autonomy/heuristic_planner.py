@@ -7,7 +7,9 @@ the closings alternate too. :mod:`tactile_lab.autonomy.variance_planner` chooses
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -19,6 +21,14 @@ from drivers.shadow.closing.closing import PRESHAPES, HIGHEST_m, LOWEST_m
 from drivers.shadow.model.hand_form import RIGHT_HAND, HandForm
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import ContactHeight, GraspPlan
+
+HasRoom: TypeAlias = Callable[[GraspPlan], bool]
+"""Whether a plan is free of obstacles that only the session knows."""
+
+
+def anywhere(plan: GraspPlan) -> bool:
+    """No obstacle for any plan."""
+    return True
 
 
 class PlanSettings(StrictModel):
@@ -63,6 +73,8 @@ _OTHER_YAWS = 12
 _BELOW_TOP_m, _ROOM_m = 0.005, 0.033  # above the fingertips' centres, the lowest proximal link being 33 mm higher
 _JUST_BELOW_TOP_m = 0.010
 """Fingertips so high meet what is wide at the top, however narrow it is below."""
+
+_RAISE_m = 0.005
 
 _TYPICAL_HALF_WIDTH_m = 0.030  # between one side's contacts and the middle, where only one side touches
 _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a finger that met nothing: object is aside
@@ -129,15 +141,36 @@ class HeuristicPlanner:
         self.top_m: float | None = None
         """Height of its top above the table, if it was touched."""
 
-    def plan(self, index: int, has_room: Callable[[GraspPlan], bool] = lambda plan: True) -> GraspPlan:
-        """The grasp number ``index``, from 0: on the next side in turn, or anywhere else with room."""
+    def plan(self, index: int, has_room: HasRoom = anywhere, is_clear: HasRoom = anywhere) -> GraspPlan:
+        """The grasp number ``index``, from 0: on the next side in turn, or anywhere else with room.
+
+        Args:
+            index: of the grasp.
+            has_room: whether the open fingers can come down.
+            is_clear: whether no link meets the object then. Where one would everywhere, fingertips are higher; where
+                that does not help either, it is as if nothing was known of it.
+        """
         side = 0.53 if index % 2 else -0.53
-        plan = self._at(index, side + self._rng.uniform(-0.19, 0.19), "alternating yaw")
-        for _ in range(_OTHER_YAWS):
-            if has_room(plan):
-                break
-            plan = self._at(index, self._rng.uniform(-1.0, 1.0), "a yaw with room for the hand")
-        return plan
+        first = self._at(index, side + self._rng.uniform(-0.19, 0.19), "alternating yaw")
+        if has_room(first) and is_clear(first):
+            return first
+        plans = [first, *(self._elsewhere(index) for _ in range(_OTHER_YAWS))]
+        raised = (replace(plan, height_m=height_m) for height_m in self._raised_m(first.height_m) for plan in plans)
+        in_the_way = next(filter(has_room, plans), plans[-1])
+        return next((plan for plan in raised if has_room(plan) and is_clear(plan)), in_the_way)
+
+    def _elsewhere(self, index: int) -> GraspPlan:
+        return self._at(index, self._rng.uniform(-1.0, 1.0), "a yaw with room for the hand")
+
+    def _raised_m(self, height_m: float) -> Iterator[float]:
+        """A contact height and those above it, up to just below the top."""
+        highest_m = min(self.expected_top_m - _JUST_BELOW_TOP_m, HIGHEST_m)
+        yield from np.arange(height_m, max(height_m, highest_m) + _RAISE_m / 2, _RAISE_m).tolist()
+
+    @property
+    def expected_top_m(self) -> float:
+        """Height of the top as it was touched, otherwise as it is assumed."""
+        return self.settings.contour_top_m if self.top_m is None else self.top_m
 
     def _at(self, index: int, place: float, reason: str) -> GraspPlan:
         """A grasp at a place in the yaw window, from -1 to 1."""

@@ -19,6 +19,7 @@ from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.room import Room
 from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.estimated_object import EstimatedObject
+from tactile_lab.autonomy.felt_outline import FeltOutline
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
 from tactile_lab.autonomy.standing.beside import Beside
@@ -72,7 +73,7 @@ class Planner:
         self._slam, self._rule, self._exploration = slam, rule, exploration
         self._fixed_grasps, self._hand, self._dimension = fixed_grasps, hand, dimension
         self._object = EstimatedObject(slam, exploration, dimension)
-        self._room = Room(hand)
+        self._room, self._felt = Room(hand), FeltOutline(hand)
         self._by_estimate = False
         self._doubted = False
         self._chooser, self._grasps = chooser, grasps
@@ -136,7 +137,15 @@ class Planner:
             return self._by_policy(index, self._chooser)
         chosen = self._best_by_estimate(index) if trusted else None
         self._by_estimate = chosen is not None
-        return replace(chosen or self._rule.plan(index, self._room.has), tap=self._rule.taps(index))
+        return self._by_rule(index) if chosen is None else replace(chosen, tap=self._rule.taps(index))
+
+    def _by_rule(self, index: int) -> GraspPlan:
+        plan = self._rule.plan(index, self._room.has, self._is_clear)
+        return replace(plan, tap=self._rule.taps(index))
+
+    def _is_clear(self, plan: GraspPlan) -> bool:
+        """Whether the links are, of what was felt."""
+        return self._felt.is_clear(plan, self._rule.expected_top_m)
 
     def replan(self, index: int) -> GraspPlan:
         """Another plan for the same grasp, after a person has vetoed the last one."""
@@ -144,7 +153,7 @@ class Planner:
 
     def _other(self, index: int) -> GraspPlan:
         if self.choice is None or self.choice.decision.chosen is None:
-            plan = replace(self._rule.plan(index, self._room.has), tap=self._rule.taps(index))
+            plan = self._by_rule(index)
             return replace(plan, reason=f"{plan.reason}, as the last was vetoed")
         self.choice = self.choice.without_chosen()
         return self._plan_of(self.choice, index)
@@ -154,7 +163,7 @@ class Planner:
         knowledge = self._knowledge(index)
         if knowledge is None:
             self._by_estimate = False
-            return replace(self._rule.plan(index, self._room.has), tap=self._rule.taps(index))
+            return self._by_rule(index)
         self.choice = chooser.choose(index + 1, knowledge, self._room.has)
         return self._plan_of(self.choice, index)
 
@@ -164,8 +173,8 @@ class Planner:
         if plan is not None and self._chooser is not None and knowledge is not None:
             self._chooser.on_decision(choice, knowledge)
             return plan
-        rule = self._rule.plan(index, self._room.has)
-        return replace(rule, tap=self._rule.taps(index), reason=f"{rule.reason}, as {choice.decision.reason}")
+        rule = self._by_rule(index)
+        return replace(rule, reason=f"{rule.reason}, as {choice.decision.reason}")
 
     def _knowledge(self, index: int) -> Knowledge | None:
         known, expected, covariance = (
@@ -199,6 +208,7 @@ class Planner:
         if change is Change.FELL:
             self._begin_anew(box)
         if change is not Change.STANDS:
+            self._felt.begin_anew()
             self._beside.begin(box, searches)
         return change, words
 
@@ -246,6 +256,7 @@ class Planner:
         if is_beside or plan.only_touch:
             self._object.hand_motion, self._here = Pose3(), plan.frame
             return Reorientation(0.0, np.zeros(2))
+        self._felt.on_grasp(grasp)
         least = self._exploration.least_contacts if self._chooser is None else _LEAST_BY_POLICY
         self._doubted = self._by_estimate and len(grasp.touching) < least
         if grasp.touching and (self._doubted or not self._by_estimate):
@@ -274,6 +285,7 @@ class Planner:
         """Note how the hand carried the object since the last grasp, and how well that is known."""
         self._carried, self._object.hand_motion, motion = carried, carried.world, planar(carried.world)
         self._room.on_carry(carried)
+        self._felt.on_carry(motion)
         if self._here is not None:
             pose = motion * Pose2(self._here.x_m, self._here.y_m, self._here.yaw_rad)
             self._here = GraspFrame(float(pose.x()), float(pose.y()), float(pose.theta()))

@@ -16,7 +16,8 @@ from drivers.core.contacts import Array, Grasp
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.perception.hand_odometry import HandMotion
-from tactile_lab.autonomy.hand_candidates import HandCandidate, HandLimits, HasRoom, Offer, anywhere, offer
+from tactile_lab.autonomy.hand_candidates import HandCandidate, HandLimits, Offer, offer
+from tactile_lab.autonomy.heuristic_planner import HasRoom, anywhere
 from tactile_lab.autonomy.regrasp_planner import RegraspPlanner, with_contacts
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.exploration.asking import ask

@@ -15,7 +15,8 @@ from gtsam import Pose2
 
 from drivers.core.contacts import Array, Grasp
 from sessions.motion.grasp_frame import GraspFrame
-from tactile_lab.autonomy.hand_candidates import HandLimits, HasRoom, anywhere, offer
+from tactile_lab.autonomy.hand_candidates import HandLimits, offer
+from tactile_lab.autonomy.heuristic_planner import HasRoom, anywhere
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.exploration.candidates import Candidate
 from tactile_lab.slam.exploration.expected_information import pose_nats

@@ -20,7 +20,7 @@ from sessions.perception.carrying.resistance import Resistance
 from sessions.perception.carrying.resting import at_rest
 from sessions.perception.carrying.roundness import Roundness
 from sessions.perception.carrying.tilt import tilt_rad
-from sessions.perception.carrying.tip_steps import TipSteps, tip_steps
+from sessions.perception.carrying.tip_steps import HELD_BY, TipSteps, tip_steps
 
 _ITERATIONS, _ITERATIONS_OF_OTHERS = 8, 3
 """Half as many more change a carry by less than 0.03 mm and 0.02 degrees."""
@@ -209,38 +209,30 @@ class CarryOdometry:
     def _sigma(self, spread: Array, slip: Array, steps: TipSteps, balance: Balance, unseen: Array) -> StepSigma:
         noise, held = self.noise, Roundness.of(steps, balance)
         far_m, far_rad, turned_rad = np.hypot(*spread[:2]) / np.sqrt(2), spread[2], abs(slip[2])
-        while_held_m = noise.least_m + noise.spread_m * far_m + noise.slip_m * float(np.hypot(*slip[:2]))
-        while_held_rad = noise.least_rad + noise.spread_rad * far_rad + noise.turned_rad * turned_rad**2
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
-        parts_m = [
-            while_held_m,
-            noise.roll_m * held.overhang,
-            noise.lifted_m_N * _held_up_N(steps),
-            noise.pushed_m_N * pushed_N,
-            noise.unseen * unseen[0],
-        ]
-        parts_rad = [
-            while_held_rad,
-            noise.missing_rad * turned_rad * _missing(steps),
-            noise.round_rad * float(held.turns @ steps.palm_turns_rad),
+        held_rad = [
+            noise.least_rad + noise.spread_rad * far_rad + noise.turned_rad * turned_rad**2,
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],
         ]
-        rotation_rad = float(np.linalg.norm(parts_rad))
-        translation_m = float(np.linalg.norm([*parts_m, noise.aside * self.friction.half_width_m * rotation_rad]))
-        return StepSigma(self._scale * translation_m, self._scale * rotation_rad)
+        free_rad, by_two = noise.round_rad * held.turns * steps.palm_turns_rad, steps.felt.sum(axis=1) == HELD_BY
+        parts_m = [
+            noise.least_m + noise.spread_m * far_m,
+            noise.roll_m * held.overhang,
+            noise.vertical_m_N * _vertical_N(steps),
+            noise.pushed_m_N * pushed_N,
+            noise.unseen * unseen[0],
+            noise.aside * self.friction.half_width_m * np.linalg.norm([*held_rad, free_rad[by_two].sum()]),
+        ]
+        rotation_rad = np.linalg.norm([*held_rad, free_rad.sum()])
+        return StepSigma(self._scale * float(np.linalg.norm(parts_m)), self._scale * float(rotation_rad))
 
 
-def _missing(steps: TipSteps) -> float:
-    """How many of the five fingertips did not hold the object, in the mean: each that does checks its turn."""
-    return len(FINGERS) - float(steps.felt.sum(axis=1).mean())
-
-
-def _held_up_N(steps: TipSteps) -> float:
-    """Upward force of the fingertips while the hand is not raised."""
+def _vertical_N(steps: TipSteps) -> float:
+    """Vertical force of the fingertips, up or down, while the hand is not raised."""
     low = ~raised(steps)
-    return max(float(np.median(steps.net_forces_N[low, 2])), 0.0) if low.any() else 0.0
+    return abs(float(np.median(steps.net_forces_N[low, 2]))) if low.any() else 0.0
 
 
 def _other_assumptions(usual: Friction, measured: MeasuredFriction) -> Sequence[Friction]:

@@ -29,19 +29,18 @@ UNPUSHED = LinkTimes()
 @dataclass(frozen=True)
 class CarryNoise:
     """Standard deviations of a carry, fitted to simulated carries other than the reported ones (decisions 55, 83,
-    121, 144, 153, 158, 163).
+    121, 144, 153, 158, 163, 165).
 
     Attributes:
         least_m, least_rad: of any carry.
         spread_m, spread_rad: share of the differences between the answers of other assumptions about friction.
-        slip_m: share of the slip itself.
         turned_rad: of the square of the turn by which it slipped: contacts that slide far are not where the balance
             has them.
-        missing_rad: share of the turn by which it slipped, for each fingertip of five that did not hold it.
-        aside: how far from its middle the point may be about which the object turns, as a share of its half width.
+        aside: how far from its middle the point may be about which the object turns, as a share of its half width;
+            what is round turns about its middle, if more than two fingertips hold it.
         round_rad: share of the hand's turn that a round object may be off by, over the fingertips beyond two.
         roll_m: how far an object whose sides face down rolls or rocks when it is let go and grasped, over the sine.
-        lifted_m_N: the same for each newton with which fingertips beside it hold it up.
+        vertical_m_N: the same for each newton with which fingertips beside it hold it up or press it down.
         let_go_rad_N: how the opening hand turns the object, for each newton with which it still pressed.
         pushed_m_N, pushed_rad_N: for each newton by which the fingertips' net force exceeded what a table's friction
             explains: links pushed the object then, which feel nothing.
@@ -53,24 +52,22 @@ class CarryNoise:
             object resisted.
     """
 
-    least_m: float = 0.0001
-    least_rad: float = float(np.deg2rad(0.17))
-    spread_m: float = 0.55
-    spread_rad: float = 0.12
-    slip_m: float = 0.03
-    turned_rad: float = 0.8
-    missing_rad: float = 0.15
-    aside: float = 0.33
-    round_rad: float = 0.07
-    roll_m: float = 0.0021
-    lifted_m_N: float = 0.00075
+    least_m: float = 0.00008
+    least_rad: float = float(np.deg2rad(0.03))
+    spread_m: float = 1.1
+    spread_rad: float = 0.65
+    turned_rad: float = 0.42
+    aside: float = 0.58
+    round_rad: float = 0.083
+    roll_m: float = 0.003
+    vertical_m_N: float = 0.00042
     let_go_rad_N: float = float(np.deg2rad(0.05))
     pushed_m_N: float = 0.001
     pushed_rad_N: float = float(np.deg2rad(0.5))
     closed_m_N: float = 0.003
     closed_rad_N: float = float(np.deg2rad(1.9))
-    links_m: float = 0.003
-    links_rad: float = float(np.deg2rad(3.3))
+    links_m: float = 0.0031
+    links_rad: float = float(np.deg2rad(2.2))
     landed_m_s: float = 0.005
     landed_rad_s: float = float(np.deg2rad(5.0))
     stood_m: float = 0.00025

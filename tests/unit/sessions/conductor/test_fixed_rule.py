@@ -47,6 +47,27 @@ def test_a_surface_is_touched_below_its_top_and_with_room_for_the_hand_above_it(
     assert {planner.height_m(index) for index in range(12)} == used_m
 
 
+def test_where_links_would_meet_the_object_another_yaw_is_taken() -> None:
+    plan = rule().plan(0, is_clear=lambda plan: plan.frame.yaw_rad > 0.0)
+    assert plan.frame.yaw_rad > 0.0
+    assert plan.height_m == 0.034
+
+
+def test_where_links_would_meet_it_at_every_yaw_it_is_grasped_higher_but_below_its_top() -> None:
+    planner = rule()
+    planner.top_m = 0.060
+    assert planner.plan(0, is_clear=lambda plan: plan.height_m > 0.040).height_m == pytest.approx(0.044)
+    tried_m: list[float] = []
+    given_up = planner.plan(0, is_clear=lambda plan: bool(tried_m.append(plan.height_m)))
+    assert max(tried_m) <= 0.050
+    assert given_up.height_m == 0.034
+
+
+def test_room_for_the_fingertips_matters_more_than_links() -> None:
+    plan = rule().plan(0, has_room=lambda plan: plan.frame.yaw_rad > 0.0, is_clear=lambda plan: False)
+    assert plan.frame.yaw_rad > 0.0
+
+
 def test_turns_keep_the_yaw_window() -> None:
     planner = rule(yaw_window_rad=(-1.0, 1.0))
     for yaw in np.linspace(-1.0, 1.0, 21):

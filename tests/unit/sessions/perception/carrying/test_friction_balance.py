@@ -156,11 +156,12 @@ def test_what_is_not_known_of_a_turn_moves_the_objects_middle():
     assert few.translation_m > all_five.translation_m
 
 
-def test_what_the_fingertips_hold_up_may_roll_when_it_is_let_go_of():
+@pytest.mark.parametrize("upward_N", [1.0, -1.0])
+def test_what_the_fingertips_hold_up_or_press_down_may_roll_when_it_is_let_go_of(upward_N):
     steps = carried(BOX, object_motion=TURN, palm_motion=TURN)
     flat = odometry().carry(steps).sigma
-    steps.net_forces_N[:, 2] = 1.0
-    assert odometry().carry(steps).sigma.translation_m > flat.translation_m + 3e-4
+    steps.net_forces_N[:, 2] = upward_N
+    assert odometry().carry(steps).sigma.translation_m > flat.translation_m + 1.5e-4
 
 
 def test_fingers_that_feel_nothing_go_on_closing_and_may_push_the_object():
