@@ -38,9 +38,9 @@ class PlanSettings(StrictModel):
         closings: closings to alternate between; radial first, as its contacts determine the object frame, while a pinch
             does not determine the position along the fingers.
         contour_heights_m: heights of the fingertip centres above the table, in turn, when a contour is wanted.
-        surface_heights_m: the same when the whole surface is wanted; unsuitable heights are skipped once the object's
+        surface_heights_m: the same when the whole surface is wanted. Unsuitable heights are skipped once the object's
             top was touched.
-        contour_top_m: assumed height of objects if a contour is wanted, since their top is not touched then.
+        contour_top_m: assumed height of objects until then.
         yaw_window_rad: lowest and highest yaw of the grasp frame that the arm can reach.
         start_m: expected position of the object before the first grasp, world x, y.
         turn_rad: smallest and largest re-orientation.
@@ -68,6 +68,18 @@ class PlanSettings(StrictModel):
             raise ValueError("the re-orientation's first value must be the smaller one, and not negative")
         return self
 
+    def as_felt(self, top_m: float | None, outline_m: float = 0.0) -> PlanSettings:
+        """The same for one object.
+
+        Args:
+            top_m: height of its top as it was touched; None if it was not. Contours are felt below it.
+            outline_m: height from which on its outline can be felt.
+        """
+        expected_m = self.contour_top_m if top_m is None else top_m
+        heights_m = self.contour_heights_m if top_m is None else _fitting(self.contour_heights_m, top_m)
+        raised_m = tuple(dict.fromkeys(max(height_m, outline_m) for height_m in heights_m))
+        return self.model_copy(update={"contour_heights_m": raised_m, "contour_top_m": expected_m})
+
 
 _OTHER_YAWS = 12
 _BELOW_TOP_m, _ROOM_m = 0.005, 0.033  # above the fingertips' centres, the lowest proximal link being 33 mm higher
@@ -83,6 +95,12 @@ _MISSED_SIDE_m = {"FF": -0.012, "MF": -0.004, "RF": 0.004, "LF": 0.012}  # a fin
 def _fits(height_m: float, top_m: float) -> bool:
     """Whether fingertips so high are below the top, and what is above them over it."""
     return height_m + _BELOW_TOP_m < top_m < height_m + _ROOM_m
+
+
+def _fitting(heights_m: tuple[float, ...], top_m: float) -> tuple[float, ...]:
+    """Those that fit; otherwise the highest, or just below the top."""
+    just_below_m = max(top_m - _JUST_BELOW_TOP_m, LOWEST_m)
+    return tuple(each for each in heights_m if _fits(each, top_m)) or (min(max(heights_m), just_below_m),)
 
 
 def contact_centre(grasp: Grasp, plan: GraspPlan, form: HandForm = RIGHT_HAND) -> Array:
@@ -190,10 +208,7 @@ class HeuristicPlanner:
 
     def height_m(self, index: int) -> float:
         """The next contact height in turn, among those at which the hand has room above the object."""
-        heights_m, top_m = self._heights_m, self.top_m
-        if top_m is not None:
-            fitting_m = tuple(height_m for height_m in heights_m if _fits(height_m, top_m))
-            heights_m = fitting_m or (min(heights_m, key=lambda height_m: abs(height_m - top_m)),)
+        heights_m = self._heights_m if self.top_m is None else _fitting(self._heights_m, self.top_m)
         return heights_m[(index + index // 4) % len(heights_m)]
 
     @property

@@ -194,7 +194,7 @@ class Planner:
         It is used until the estimate takes over: every time the object is carried it slips within the box.
         """
         if box.top_m is not None:
-            self._rule.top_m = box.top_m
+            self._on_heights(top_m=box.top_m)
         if not box.has_sides:
             return
         self._room.box = box
@@ -216,11 +216,19 @@ class Planner:
         """Forget what was known of an object that fell over."""
         self._object.is_outdated, self._doubted, self._room.landings_m = True, False, []
         self._beside.return_above()
-        self._standstill, self._empty, self._outline_m = Standstill(), EmptyClosings(), 0.0
+        self._standstill, self._empty = Standstill(), EmptyClosings()
+        self._on_heights(outline_m=0.0)
         if self._chooser is not None:
             self._chooser.begin_anew()
         self.on_bounding_box(box)
         self._rule.centre_m = box.centre_world_m
+
+    def _on_heights(self, top_m: float | None = None, outline_m: float | None = None) -> None:
+        """The top was felt, or from which height on the outline can be."""
+        self._rule.top_m = self._rule.top_m if top_m is None else top_m
+        self._outline_m = self._outline_m if outline_m is None else outline_m
+        if self._chooser is not None:
+            self._chooser.on_heights(self.settings.as_felt(self._rule.top_m, self._outline_m))
 
     def on_landings(self, points_world_m: list[Array]) -> None:
         """Note where fingertips landed on the object; used until the object is moved."""
@@ -249,7 +257,7 @@ class Planner:
         is_beside = self._beside.is_on
         is_raised = not is_beside and plan.height_m > max(self.settings.contour_heights_m)
         if self._dimension == 2 and is_raised and grasp.touching:
-            self._outline_m = plan.height_m
+            self._on_heights(outline_m=plan.height_m)
         self._beside.on_grasp(grasp)
         if not is_beside and self._dimension == 3 and self._rule.top_m is not None:
             self._empty.on_grasp(grasp, plan)
@@ -262,7 +270,7 @@ class Planner:
         if grasp.touching and (self._doubted or not self._by_estimate):
             self._rule.centre_m = contact_centre(grasp, plan, self._hand.form)
         if tops_m := [float(c.point_world_m[2]) for c in grasp.contacts if c.probed and c.normal_world[2] > _UPWARD]:
-            self._rule.top_m = max(tops_m)
+            self._on_heights(top_m=max(tops_m))
         turn_rad = self._turn(grasp, plan)
         self._object.hand_motion, self._here = Pose3(), plan.frame
         shift_m = np.zeros(2) if turn_rad is None else self._rule.step_back(self.centre_m)

@@ -17,7 +17,7 @@ from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.perception.hand_odometry import HandMotion
 from tactile_lab.autonomy.hand_candidates import HandCandidate, HandLimits, Offer, offer
-from tactile_lab.autonomy.heuristic_planner import HasRoom, anywhere
+from tactile_lab.autonomy.heuristic_planner import HasRoom, PlanSettings, anywhere
 from tactile_lab.autonomy.regrasp_planner import RegraspPlanner, with_contacts
 from tactile_lab.autonomy.variance_planner import KnownShape
 from tactile_lab.slam.exploration.asking import ask
@@ -161,6 +161,11 @@ class PolicyChooser:
         self._expected: PredictedContacts | None = None
         self._missed_m: list[Array] = []
         self._met_m: list[Array] = []
+
+    def on_heights(self, plan: PlanSettings) -> None:
+        """At which heights the object can be touched, as it was felt."""
+        self._limits = replace(self._limits, plan=plan)
+        self._turns = replace(self._turns, limits=self._limits)
 
     def choose(self, number: int, knowledge: Knowledge, has_room: HasRoom = anywhere) -> Choice:
         """The next grasp among all candidates."""

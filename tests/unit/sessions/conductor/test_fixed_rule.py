@@ -33,7 +33,8 @@ def test_fixed_rule_alternates_sides_closings_and_heights() -> None:
     ("top_m", "used_m"),
     [
         (None, {0.034, 0.018, 0.048}),
-        (0.01, {0.018}),
+        (0.01, {0.015}),
+        (0.022, {0.015}),
         (0.04, {0.034, 0.018}),
         (0.06, {0.034, 0.048}),
         (0.12, {0.048}),
@@ -45,6 +46,21 @@ def test_a_surface_is_touched_below_its_top_and_with_room_for_the_hand_above_it(
     planner = HeuristicPlanner(PlanSettings(), np.random.default_rng(0), dimension=3)
     planner.top_m = top_m
     assert {planner.height_m(index) for index in range(12)} == used_m
+
+
+@pytest.mark.parametrize(
+    ("top_m", "used_m"), [(None, 0.034), (0.022, 0.015), (0.04, 0.034), (0.06, 0.034), (0.09, 0.034)]
+)
+def test_a_contour_is_felt_below_the_top(top_m: float | None, used_m: float) -> None:
+    planner = rule()
+    planner.top_m = top_m
+    assert planner.height_m(0) == pytest.approx(used_m)
+    assert planner.settings.as_felt(top_m).contour_heights_m == pytest.approx((used_m,))
+
+
+def test_a_contour_that_can_be_felt_higher_only_is_felt_there() -> None:
+    felt = PlanSettings(contour_heights_m=(0.030, 0.034)).as_felt(0.06, outline_m=0.047)
+    assert (felt.contour_heights_m, felt.contour_top_m) == ((0.047,), 0.06)
 
 
 def test_where_links_would_meet_the_object_another_yaw_is_taken() -> None:

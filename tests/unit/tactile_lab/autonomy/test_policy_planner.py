@@ -14,6 +14,7 @@ from sessions.conductor.estimator_client import LocalClient
 from sessions.conductor.policy_decisions import PolicyDecisions, Proposal, approve_everything
 from sessions.guided.attended import AttendedDecisions
 from sessions.guided.operator import Ask, Panel, Request
+from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.hand_candidates import (
     OUT_OF_REACH,
     offer,
@@ -93,6 +94,12 @@ def test_the_policy_is_asked_after_the_fixed_grasps_and_its_decision_is_told_onc
     assert decision.plan.reason.startswith("variance: ")
     who.decide(1)
     assert [choice.number for choice in told] == [2]
+
+
+def test_the_policy_chooses_below_the_top_that_was_felt() -> None:
+    made = planner()
+    made.on_bounding_box(BoundingBox(Pose2(), np.zeros(2), np.zeros(2), 0.0, 0.022, {}, has_sides=False))
+    assert [made.plan(index).height_m for index in (0, 1)] == [0.015, 0.015]
 
 
 def test_a_veto_takes_the_next_best_and_is_recorded() -> None:
