@@ -212,6 +212,7 @@ class CarryOdometry:
         pressed_N, pushed_N = float(steps.forces_N[-1].sum()), _pushed_N(steps)
         held_rad = [
             noise.least_rad + noise.spread_rad * far_rad + noise.turned_rad * turned_rad**2,
+            noise.missing_rad * turned_rad * _missing(steps),
             noise.let_go_rad_N * pressed_N,
             noise.pushed_rad_N * pushed_N,
             noise.unseen * unseen[1],
@@ -227,6 +228,11 @@ class CarryOdometry:
         ]
         rotation_rad = np.linalg.norm([*held_rad, free_rad.sum()])
         return StepSigma(self._scale * float(np.linalg.norm(parts_m)), self._scale * float(rotation_rad))
+
+
+def _missing(steps: TipSteps) -> float:
+    """How many of the five fingertips did not hold the object, in the mean: each that does checks its turn."""
+    return len(FINGERS) - float(steps.felt.sum(axis=1).mean())
 
 
 def _vertical_N(steps: TipSteps) -> float:

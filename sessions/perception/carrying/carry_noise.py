@@ -36,6 +36,7 @@ class CarryNoise:
         spread_m, spread_rad: share of the differences between the answers of other assumptions about friction.
         turned_rad: of the square of the turn by which it slipped: contacts that slide far are not where the balance
             has them.
+        missing_rad: share of the turn by which it slipped, for each fingertip of five that did not hold it.
         aside: how far from its middle the point may be about which the object turns, as a share of its half width;
             what is round turns about its middle, if more than two fingertips hold it.
         round_rad: share of the hand's turn that a round object may be off by, over the fingertips beyond two.
@@ -52,16 +53,17 @@ class CarryNoise:
             object resisted.
     """
 
-    least_m: float = 0.00008
+    least_m: float = 0.000075
     least_rad: float = float(np.deg2rad(0.03))
-    spread_m: float = 1.1
-    spread_rad: float = 0.65
-    turned_rad: float = 0.42
+    spread_m: float = 1.05
+    spread_rad: float = 0.62
+    turned_rad: float = 0.40
+    missing_rad: float = 0.10
     aside: float = 0.58
-    round_rad: float = 0.083
-    roll_m: float = 0.003
-    vertical_m_N: float = 0.00042
-    let_go_rad_N: float = float(np.deg2rad(0.05))
+    round_rad: float = 0.079
+    roll_m: float = 0.00285
+    vertical_m_N: float = 0.0004
+    let_go_rad_N: float = float(np.deg2rad(0.08))
     pushed_m_N: float = 0.001
     pushed_rad_N: float = float(np.deg2rad(0.5))
     closed_m_N: float = 0.003

@@ -10,6 +10,7 @@ from gtsam import Pose2
 
 from drivers.core.contacts import FINGERS
 from sessions.perception.carrying.carry import CarryOdometry
+from sessions.perception.carrying.carry_noise import CarryNoise
 from sessions.perception.carrying.friction_balance import Balance
 from sessions.perception.carrying.roundness import Roundness
 from sessions.perception.carrying.tip_steps import TipSteps
@@ -40,6 +41,19 @@ def test_each_finger_that_holds_a_round_object_makes_its_turn_more_certain() -> 
     sigmas_rad = [CarryOdometry({}, "right").carry(turned(DISC, count)).sigma.rotation_rad for count in (5, 4, 3)]
     assert sigmas_rad[0] < 0.8 * sigmas_rad[1] < 0.6 * sigmas_rad[2]
     assert sigmas_rad[2] > 0.05 * TURN.theta()
+
+
+def test_fingertips_that_do_not_hold_leave_the_turn_of_a_slip_unsure() -> None:
+    steps = carried(BOX, object_motion=Pose2(), palm_motion=TURN, count=40)
+    forces_N = steps.forces_N.copy()
+    forces_N[20:, 1] = 0.0
+    unsure, sure = CarryOdometry({}, "right"), CarryOdometry({}, "right")
+    sure.noise = CarryNoise(missing_rad=0.0)
+    missing = replace(steps, forces_N=forces_N)
+    added_rad2 = unsure.carry(missing).sigma.rotation_rad ** 2 - sure.carry(missing).sigma.rotation_rad ** 2
+    slipped_rad = abs(unsure.carry(missing).slip_rad)
+    assert np.sqrt(added_rad2) == pytest.approx(unsure.noise.missing_rad * 0.5 * slipped_rad, rel=0.01)
+    assert unsure.carry(steps).sigma == sure.carry(steps).sigma
 
 
 def test_a_while_in_which_two_fingers_hold_makes_a_turn_as_uncertain_as_they_do() -> None:
