@@ -27,7 +27,7 @@ from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
 from sessions.motion.safety import SafetySettings
-from tactile_lab.autonomy.collision_check import links_are_clear, standing
+from tactile_lab.autonomy.clearance.collision_check import links_are_clear, standing
 from tactile_lab.autonomy.heuristic_planner import HasRoom, PlanSettings, anywhere
 from tactile_lab.autonomy.variance_planner import ExplorationSettings, KnownShape, closing_rays
 from tactile_lab.slam.exploration.candidates import Candidate, ClosingRays

@@ -18,8 +18,8 @@ from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.room import Room
 from sessions.perception.hand_odometry import HandMotion
+from tactile_lab.autonomy.clearance.felt_outline import FeltOutline
 from tactile_lab.autonomy.estimated_object import EstimatedObject
-from tactile_lab.autonomy.felt_outline import FeltOutline
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings, contact_centre
 from tactile_lab.autonomy.policy_choice import Choice, Knowledge, PolicyChooser
 from tactile_lab.autonomy.standing.beside import Beside
@@ -302,6 +302,7 @@ class Planner:
     def on_undo(self, hand_motion_world: Pose3) -> None:
         """Note that the last grasp was undone; the motion is the hand odometry since the one before."""
         self._object.hand_motion, self._doubted, self._empty = hand_motion_world, False, EmptyClosings()
+        self._felt.begin_anew()
 
     def on_estimate(self, index: int, is_placed: bool) -> None:
         """Note that grasp number ``index`` has been estimated.

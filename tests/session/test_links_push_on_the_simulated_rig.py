@@ -16,7 +16,7 @@ from sessions.motion.motion import Motion
 from sessions.motion.safety import SafetySettings, SafetySupervisor
 from sessions.recording.recorder import Recorder
 from tactile_lab.autonomy.autonomous_roles import hand_shape
-from tactile_lab.autonomy.collision_check import links_are_clear, standing
+from tactile_lab.autonomy.clearance.collision_check import links_are_clear, standing
 from tactile_lab.experiments.thesis.rig_sessions import record
 from tactile_lab.rigs.build import build_runtime
 from tactile_lab.rigs.description import load_rig

@@ -13,9 +13,11 @@ from drivers.core.contacts import FINGERS, Array, Contact, Grasp
 from drivers.shadow.closing.closing import Closing, closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import TouchSettings
+from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.perception.hand_odometry import HandMotion
+from tactile_lab.autonomy.clearance.felt_outline import FeltOutline
 from tactile_lab.autonomy.heuristic_planner import HeuristicPlanner, PlanSettings
 from tactile_lab.autonomy.planner import Planner
 from tactile_lab.autonomy.variance_planner import (
@@ -336,3 +338,29 @@ def test_reorientation_keeps_the_window_and_brings_the_object_back() -> None:
     wanted = chooser.on_grasp(grasp_at("MF", "TH", x=0.03), GraspPlan(chooser.plan(0).frame, "pinch", 0.022))
     assert 0.2 <= abs(wanted.turn_rad) <= 0.8
     assert np.linalg.norm(wanted.shift_world_m) <= 0.03
+
+
+def round_a_long_box(half_m: float = 0.06) -> Grasp:
+    contacts = tuple(
+        Contact(f, np.array([x, y, 0.034]), np.array([np.sign(x), 0, 0]), 1e-6 * np.eye(3), 0.05, 0.5)
+        for f, x, y in (("FF", half_m, 0.02), ("LF", half_m, -0.02), ("TH", -half_m, 0.0))
+    )
+    return Grasp(0, 0, contacts, Pose3())
+
+
+def test_the_rule_turns_or_rises_where_links_would_be_in_what_was_felt() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9)
+    chooser.on_grasp(round_a_long_box(), replace(chooser.plan(0), frame=GraspFrame(0.0, 0.0, 0.0)))
+    found = chooser.plan(1)
+    felt = FeltOutline(HandShape())
+    felt.on_grasp(round_a_long_box())
+    assert felt.is_clear(found, 0.05)
+    assert not felt.is_clear(replace(found, frame=GraspFrame(0.0, 0.0, 0.0), height_m=0.034), 0.05)
+
+
+def test_contacts_of_a_grasp_that_is_undone_are_in_no_way() -> None:
+    chooser = planner(KnownSlam(None, None), fixed_grasps=9)
+    chooser.on_grasp(round_a_long_box(), chooser.plan(0))
+    assert {chooser.plan(index).reason for index in range(1, 9)} != {"alternating yaw"}
+    chooser.on_undo(Pose3())
+    assert {chooser.plan(index).reason for index in range(1, 9)} == {"alternating yaw"}

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from tactile_lab.autonomy.collision_check import StandingObject, links_are_clear, standing
+from tactile_lab.autonomy.clearance.collision_check import StandingObject, links_are_clear, standing
 from tests.support.box_shapes import FLAT_BOX, SOLID_BOX, flat_box, solid_box
 
 TIP = HandShape()

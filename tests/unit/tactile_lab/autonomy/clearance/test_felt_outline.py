@@ -14,7 +14,7 @@ from drivers.core.contacts import Contact, Grasp
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
-from tactile_lab.autonomy.felt_outline import FeltOutline
+from tactile_lab.autonomy.clearance.felt_outline import FeltOutline
 
 LONG_SIDES = ((0.06, -0.02), (0.06, 0.02), (-0.06, 0.02), (-0.06, -0.02))
 """Contacts around a box of 120 x 40 mm, long along x."""

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 from drivers.core.contacts import Array, Grasp
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.grasp_plan import GraspPlan
-from tactile_lab.autonomy.collision_check import StandingObject, links_are_clear
+from tactile_lab.autonomy.clearance.collision_check import StandingObject, links_are_clear
 from tactile_lab.slam.exploration.policy import Surface
 
 _SPACING_m = 0.002
