@@ -47,6 +47,10 @@ _ASSUMED_m = 0.030
 """From the middle to a side of which nothing is known."""
 
 
+def _nowhere() -> Array:
+    return np.empty((0, 3))
+
+
 @dataclass
 class FeltObject:
     """One object on the table.
@@ -58,12 +62,12 @@ class FeltObject:
 
     box: BoundingBox
     grasps: int = 0
-    _points_m: list[Array] = field(default_factory=list)
-    _normals: list[Array] = field(default_factory=list)
-    _looked_m: dict[bool, list[Array]] = field(default_factory=lambda: {True: [], False: []})
+    _points_m: Array = field(default_factory=_nowhere)
+    _normals: Array = field(default_factory=_nowhere)
+    _looked_m: dict[bool, Array] = field(default_factory=lambda: {True: _nowhere(), False: _nowhere()})
     """Places on the top, and on sides."""
 
-    _open_m: list[Array] = field(default_factory=list)
+    _open_m: Array = field(default_factory=_nowhere)
     _passed_m: list[Array] = field(default_factory=list)
     _pushed: Array | None = None
     _first: BoundingBox = field(init=False)
@@ -97,8 +101,8 @@ class FeltObject:
 
     def add(self, points_m: Array, normals: Array) -> None:
         """Contacts, shape (n, 3) each, world frame; the box is fitted again."""
-        self._points_m, self._normals = [*self._points_m, *points_m], [*self._normals, *normals]
-        if not self._points_m:
+        self._points_m, self._normals = np.vstack([self._points_m, points_m]), np.vstack([self._normals, normals])
+        if not len(self._points_m):
             return
         points_m, normals = self._contacts()
         top_m = max(self.box.top_m or 0.0, float(points_m[:, 2].max()))
@@ -140,18 +144,18 @@ class FeltObject:
             points_m, normals: shape (n, 3) each, world frame.
             motion: world frame.
         """
-        self._points_m, self._normals, self._moved = [], [], self._first.move(motion)
+        self._points_m, self._normals, self._moved = _nowhere(), _nowhere(), self._first.move(motion)
         self.add(points_m, normals)
 
     def on_looked(self, places_m: Array, *, on_top: bool = False) -> None:
         """Contacts were expected at these places of the top or of sides, (n, 3), world: found there, elsewhere or
         nowhere, they are no longer new.
         """
-        self._looked_m[on_top] += list(places_m)
+        self._looked_m[on_top] = np.vstack([self._looked_m[on_top], places_m])
 
     def look_again(self) -> None:
         """Places where contacts were expected and found elsewhere, or nowhere, are new again."""
-        self._looked_m = {True: [], False: []}
+        self._looked_m = {True: _nowhere(), False: _nowhere()}
 
     def on_pushed(self, way: Array) -> None:
         """It was touched from one side alone along a horizontal unit vector, world, shape (2,)."""
@@ -160,7 +164,8 @@ class FeltObject:
 
     def on_missed_top(self, places_m: Array) -> None:
         """Fingertips of a tap were expected at these places, (n, 3), world: those far from all contacts met nothing."""
-        self._open_m += list(places_m[self._apart_m(places_m, self._points_m) > _OPEN_m[0]])
+        missed_m = places_m[self._apart_m(places_m, self._points_m) > _OPEN_m[0]]
+        self._open_m = np.vstack([self._open_m, missed_m])
 
     def on_passed(self, paths: Sequence[ApproachPath]) -> None:
         """Fingertips that came to touch a side have gone these ways."""
@@ -187,7 +192,7 @@ class FeltObject:
 
     def _contacts(self) -> tuple[Array, Array]:
         """Places and normals of all contacts, shape (n, 3) each, world frame."""
-        return np.array(self._points_m).reshape(-1, 3), np.array(self._normals).reshape(-1, 3)
+        return self._points_m, self._normals
 
     @property
     def is_round(self) -> bool:
@@ -216,14 +221,14 @@ class FeltObject:
         """
         points_m, normals = self._contacts()
         facing = normals[:, 2] > _NO_SIDE if on_top else normals[:, 2] < _UPWARD
-        return np.minimum(self._apart_m(places_m, [*points_m[facing], *self._looked_m[on_top]]), _FAR_m)
+        return np.minimum(self._apart_m(places_m, np.vstack([points_m[facing], self._looked_m[on_top]])), _FAR_m)
 
     @staticmethod
-    def _apart_m(places_m: Array, others_m: Sequence[Array]) -> Array:
-        """Of places (n, 3) to the nearest of others, (3,) each, shape (n,); infinite where there is none."""
+    def _apart_m(places_m: Array, others_m: Array) -> Array:
+        """Of places (n, 3) to the nearest of others (m, 3), shape (n,); infinite where there is none."""
         if len(others_m) == 0:
             return np.full(len(places_m), np.inf)
-        return np.asarray(cdist(places_m, np.reshape(others_m, (-1, 3))).min(axis=1))
+        return np.asarray(cdist(places_m, others_m).min(axis=1))
 
     def are_open(self, places_m: Array) -> NDArray[np.bool_]:
         """Whether a tap has met nothing near places of the top, (n, 3), and nearer than any contact is, shape (n,)."""
@@ -257,7 +262,12 @@ class FeltObject:
 
     def are_new(self, places_m: Array, *, on_top: bool = False) -> NDArray[np.bool_]:
         """Which of the places (n, 3) are not known yet, shape (n,)."""
-        return self.distances_m(places_m, on_top=on_top) > _NEAR_m
+        return self.is_new(self.distances_m(places_m, on_top=on_top))
+
+    @staticmethod
+    def is_new(known_m: Array) -> NDArray[np.bool_]:
+        """Which places so far from what is known, any shape, are not known yet."""
+        return known_m > _NEAR_m
 
     def is_unknown(self, places_m: Array) -> bool:
         """Whether places (n, 3) are on average far from all that is known."""

@@ -66,9 +66,12 @@ class TouchPlanner(ActionPlanner):
 
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
-        sides = (one for one in self._sides() if self.felt.are_new(one.touches_m).any())
-        offers = (one for one in (*self._taps(), *sides) if self._is_open(one))
-        return max(offers, key=lambda one: one.score_m, default=None)
+        best_first = sorted((*self._taps(), *self._sides()), key=lambda one: one.score_m, reverse=True)
+        return next((one for one in best_first if self._is_news(one) and self._is_open(one)), None)
+
+    def _is_news(self, one: StandingCandidate) -> bool:
+        """Whether it would tell anything new; a tap that would not is not offered at all."""
+        return one.on_top or bool(self.felt.are_new(one.touches_m).any())
 
     def _is_open(self, one: StandingCandidate) -> bool:
         return not self._was_blocked(one.plan) and self.reach.holds(one.plan, self.hand)
@@ -82,13 +85,9 @@ class TouchPlanner(ActionPlanner):
             for other in self.blocked
         )
 
-    def _candidate(
-        self, frame: GraspFrame, name: str, height_m: float, touches: dict[str, Array], *, on_top: bool
-    ) -> StandingCandidate:
-        what = "tap on the top" if on_top else "one side touched"
-        plan = GraspPlan(frame, name, height_m, f"{what}: {len(touches)} contacts expected", only_touch=True)
-        novelty_m = self.felt.novelty_m(np.array(list(touches.values())), on_top=on_top)
-        return StandingCandidate(plan, touches, novelty_m, on_top=on_top)
+    @staticmethod
+    def _plan(frame: GraspFrame, name: str, height_m: float, what: str, count: int) -> GraspPlan:
+        return GraspPlan(frame, name, height_m, f"{what}: {count} contacts expected", only_touch=True)
 
     # --- from above ----------------------------------------------------------------------------------------------
 
@@ -103,15 +102,17 @@ class TouchPlanner(ActionPlanner):
         ]
         frames = [GraspFrame(*middle, yaw_rad) for middle in middles for yaw_rad in yaws_rad]
         fingers, tips_m = self._tapping_tips()
-        places_m = np.array([frame.pose.matrix()[:3, :3] @ tips_m for frame in frames]).swapaxes(1, 2)
+        turned_m = {yaw_rad: GraspFrame(0.0, 0.0, yaw_rad).pose.matrix()[:3, :3] @ tips_m for yaw_rad in yaws_rad}
+        places_m = np.array([turned_m[frame.yaw_rad] for frame in frames]).swapaxes(1, 2)
         places_m[..., :2] += np.array([[frame.x_m, frame.y_m] for frame in frames])[:, None]
         places_m[..., 2] = box.size_m[2]
         met = self._met(box, places_m)
-        new = self.felt.are_new(places_m.reshape(-1, 3), on_top=True).reshape(met.shape)
-        for row in np.flatnonzero((met & new).any(axis=1)):
+        known_m = self.felt.distances_m(places_m.reshape(-1, 3), on_top=True).reshape(met.shape)
+        for row in np.flatnonzero((met & self.felt.is_new(known_m)).any(axis=1)):
             tips = zip(fingers, places_m[row], met[row], strict=True)
             touches = {finger: place for finger, place, is_met in tips if is_met}
-            yield self._candidate(frames[row], TAP.closing, TAP_HEIGHT_m, touches, on_top=True)
+            plan = self._plan(frames[row], TAP.closing, TAP_HEIGHT_m, "tap on the top", len(touches))
+            yield StandingCandidate(plan, touches, float(known_m[row][met[row]].sum()), on_top=True)
 
     def _tapping_tips(self) -> tuple[Sequence[str], Array]:
         """The fingers of a tap, and where their tips are in the grasp frame, shape (3, fingers)."""
@@ -170,8 +171,9 @@ class TouchPlanner(ActionPlanner):
         """A touch at a place on a side by a closing of that name."""
         front_m = np.array([place.frame.x_m, place.frame.y_m])
         touches = _touched(front_m, place.height_m, place.up_to_m, self.hand.form.long_fingers)
-        one = self._candidate(place.frame, name, place.height_m, touches, on_top=False)
-        return replace(one, plan=replace(one.plan, places=(place,)))
+        plan = self._plan(place.frame, name, place.height_m, "one side touched", len(touches))
+        novelty_m = self.felt.novelty_m(np.array(list(touches.values())))
+        return StandingCandidate(replace(plan, places=(place,)), touches, novelty_m)
 
     def _hardly_leans(self, height_m: float, foot_m: float) -> bool:
         """Whether what gives way so high, as far as the hand goes, leans by less than half of what it falls at.

@@ -59,7 +59,7 @@ def test_a_run_in_the_plane_has_the_sizes_of_its_outline() -> None:
 
 
 def _known_poses_run(data: SimulatedGrasps, dimension: Literal[2, 3], freedom: Literal["table", "space"]) -> SlamResult:
-    settings = SlamSettings(method="known-pose", dimension=dimension, freedom=freedom)
+    settings = SlamSettings(method="known-pose", dimension=dimension, freedom=freedom, mesh_resolution_m=0.01)
     slam = TactileSlam(settings, 0, known_poses=data.world_T_body)
     for grasp in data.grasps:
         slam.add_grasp(grasp)

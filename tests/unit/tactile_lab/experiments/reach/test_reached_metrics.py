@@ -14,7 +14,7 @@ from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 @pytest.fixture(autouse=True)
 def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each costs a look at every posture of the hand."""
-    monkeypatch.setattr(reached_metrics, "_PLACES", 300)
+    monkeypatch.setattr(reached_metrics, "_PLACES", 200)
 
 
 def box(wider_m: float = 0.0) -> trimesh.Trimesh:

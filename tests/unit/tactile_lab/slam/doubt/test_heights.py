@@ -11,6 +11,9 @@ from drivers.core.contacts import Contact, Grasp
 from tactile_lab.slam.slam_settings import SlamSettings
 from tactile_lab.slam.tactile_slam import TactileSlam
 
+QUICK = {"method": "odometry", "shape_model": "gpis", "mesh_resolution_m": 0.006}
+"""Heights are told whatever follows the object and models it."""
+
 
 def _grasp(number: int, heights_m: tuple[float, ...], top_m: float) -> Grasp:
     """Contacts around a disc of 30 mm radius at these heights, and one on its flat top."""
@@ -24,7 +27,7 @@ def _grasp(number: int, heights_m: tuple[float, ...], top_m: float) -> Grasp:
 
 
 def _doubts(heights_m: tuple[float, ...], dimension: int = 2) -> dict[str, str]:
-    slam = TactileSlam(SlamSettings(dimension=dimension), 0)
+    slam = TactileSlam(SlamSettings(dimension=dimension, **QUICK), 0)
     for number in range(4):
         slam.add_grasp(_grasp(number, heights_m, top_m=0.15))
     return {doubt.name: doubt.words for doubt in slam.finish().doubts}
@@ -44,7 +47,7 @@ def test_a_surface_has_all_heights() -> None:
 
 @pytest.mark.parametrize("broken", [np.nan, np.inf])
 def test_a_grasp_that_cannot_be_read_has_no_heights(broken: float) -> None:
-    slam = TactileSlam(SlamSettings(dimension=2), 0)
+    slam = TactileSlam(SlamSettings(dimension=2, **QUICK), 0)
     for number in range(4):
         slam.add_grasp(_grasp(number, (0.02, 0.03, 0.04, 0.03, 0.02), top_m=0.15))
     contact = replace(_grasp(4, (0.02,), 0.15).contacts[0], point_world_m=np.array([0.03, 0.0, broken]))

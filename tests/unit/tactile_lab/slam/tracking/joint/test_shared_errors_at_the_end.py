@@ -32,7 +32,7 @@ def finished(data: PlanarGrasps) -> SlamResult:
 
 @pytest.mark.parametrize(("shape", "has_faces"), [("rectangle", True), ("ellipse", False)])
 def test_only_flat_faces_tell_errors(shape: str, has_faces: bool) -> None:
-    data = with_finger_errors(planar_data.simulate(shape, 3, count=8), 0.0008, np.random.default_rng(3))
+    data = with_finger_errors(planar_data.simulate(shape, 3, count=5), 0.0008, np.random.default_rng(3))
     grasps = [replace(grasp, contacts=tuple(map(summed_up, grasp.contacts))) for grasp in data.grasps]
     stated, summed = finished(data), finished(replace(data, grasps=tuple(grasps)))
     assert stated.contour is not None
