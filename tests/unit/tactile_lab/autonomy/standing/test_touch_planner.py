@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from gtsam import Pose2, Pose3
@@ -52,9 +54,22 @@ def carry_out(touches: TouchPlanner, most: int = 80) -> list[StandingCandidate]:
     return done
 
 
-def test_a_wide_box_is_tapped_all_over_and_touched_all_around_until_nothing_is_new() -> None:
+@dataclass(frozen=True)
+class Touched:
+    """A box, and all touches of it."""
+
+    known: FeltObject
+    done: list[StandingCandidate]
+
+
+@pytest.fixture(scope="module")
+def wide() -> Touched:
     known = felt()
-    done = carry_out(planner(known))
+    return Touched(known, carry_out(planner(known)))
+
+
+def test_a_wide_box_is_tapped_all_over_and_touched_all_around_until_nothing_is_new(wide: Touched) -> None:
+    known, done = wide.known, wide.done
     assert 10 < len(done) < 80
     assert all(one.plan.only_touch for one in done)
     on_top = np.array([place for one in done for place in one.touches_m if place[2] == 0.07])
@@ -67,17 +82,16 @@ def test_a_wide_box_is_tapped_all_over_and_touched_all_around_until_nothing_is_n
 
 @pytest.mark.parametrize("hand", [TIP, HandShape(form=LEFT), HandShape(form=LITE)], ids=["right", "left", "lite"])
 def test_the_palm_of_every_hand_stays_above_the_table_and_fingers_it_lacks_touch_nothing(hand: HandShape) -> None:
-    done = carry_out(TouchPlanner(felt(top_m=0.12), hand, WINDOW_rad, SideReach()))
+    done = carry_out(TouchPlanner(felt(0.12, 0.10, 0.12), hand, WINDOW_rad, SideReach()))
     aside = [one for one in done if closing(one.plan.closing, one.plan.height_m, hand).is_sideways]
     palms_m = [closing(one.plan.closing, one.plan.height_m, hand).grasp_T_palm.z() for one in aside]
     assert min(palms_m) > SafetySettings().palm_minimum_height_m + 0.004
     assert all(set(one.touches) <= set(hand.form.fingers) for one in done)
 
 
-def test_every_expected_place_lies_on_the_box() -> None:
-    known = felt()
-    places = np.vstack([one.touches_m for one in carry_out(planner(known))])
-    assert np.abs(known.standing_box.distances_m(places)).max() < 1e-6
+def test_every_expected_place_lies_on_the_box(wide: Touched) -> None:
+    places = np.vstack([one.touches_m for one in wide.done])
+    assert np.abs(wide.known.standing_box.distances_m(places)).max() < 1e-6
 
 
 def test_a_narrow_tall_object_is_touched_low_only() -> None:
@@ -87,14 +101,17 @@ def test_a_narrow_tall_object_is_touched_low_only() -> None:
     assert max(place[2] for one in sides for place in one.touches_m) < 0.04 + 1e-9
 
 
-def sides(known: FeltObject, hand: HandShape = TIP) -> list[StandingCandidate]:
-    """All touches from the side, one after another."""
-    done = carry_out(TouchPlanner(known, hand, WINDOW_rad, SideReach()))
+def from_the_side(done: list[StandingCandidate], hand: HandShape = TIP) -> list[StandingCandidate]:
     return [one for one in done if closing(one.plan.closing, one.plan.height_m, hand).is_sideways]
 
 
-def test_one_coming_touches_a_side_at_several_places_that_are_all_new() -> None:
-    first = sides(felt())[0]
+def sides(known: FeltObject, hand: HandShape = TIP) -> list[StandingCandidate]:
+    """All touches from the side, one after another."""
+    return from_the_side(carry_out(TouchPlanner(known, hand, WINDOW_rad, SideReach())), hand)
+
+
+def test_one_coming_touches_a_side_at_several_places_that_are_all_new(wide: Touched) -> None:
+    first = from_the_side(wide.done)[0]
     assert len(first.plan.places) == 3
     assert first.plan.places[0].frame == first.plan.frame
     assert len({place.frame.yaw_rad for place in first.plan.places}) == 1
@@ -243,7 +260,7 @@ def test_what_cannot_be_grasped_is_touched_and_then_ends_in_words() -> None:
 
 
 def test_places_whose_contacts_were_elsewhere_are_looked_for_two_times_more_before_nothing_is_left() -> None:
-    standing = StandingPlanner(felt(0.16, 0.16, 0.12), TIP, WINDOW_rad, SideReach(), TouchSettings())
+    standing = StandingPlanner(felt(0.16, 0.16, 0.05), TIP, WINDOW_rad, SideReach(), TouchSettings())
     tried: list[tuple[str, float, float]] = []
     while (plan := standing.plan()) is not None and len(tried) < 200:
         tried.append((plan.closing, plan.frame.yaw_rad, plan.height_m))
