@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,17 @@ from tactile_lab.cli.options import OUR_METHODS
 from tactile_lab.evaluation.files.trajectory_file import read_trajectory
 from tactile_lab.experiments.data import planar_data, spatial_data
 from tactile_lab.slam.shape.selection.models import SHAPE_MODELS
+from tests.support.coarse_judging import judged_coarsely
 
 NORMAL_SIGMA_rad = float(np.deg2rad(5.0))
 MOTION = MotionSigma(translation_m=0.01, rotation_rad=float(np.deg2rad(20.0)))
 IDENTITY = np.eye(4).tolist()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse_judging() -> Iterator[None]:
+    with judged_coarsely():
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +43,7 @@ def planar_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def spatial_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    data = spatial_data.simulate("box-12x6x6", 1, count=8)
+    data = spatial_data.simulate("box-12x6x6", 1, count=5)
     path = tmp_path_factory.mktemp("logs") / "box.json"
     data.mesh.export(path.with_name("truth.ply"))
     truth = ObjectTruth(name="box", mesh="truth.ply")
@@ -105,7 +112,7 @@ def test_results_of_shape_models_lie_beside_each_other(inside, planar_log):
 
 
 def test_a_spatial_log_gets_a_mesh_with_its_uncertainty(inside, spatial_log, tmp_path):
-    (tmp_path / "coarse.yaml").write_text("mesh_resolution_m: 0.006\n")
+    (tmp_path / "coarse.yaml").write_text("mesh_resolution_m: 0.01\n")
     settings = ("--settings", tmp_path / "coarse.yaml", "--largest-sigma", 1e6)
     words = ("--method", "known-pose", *settings, "--out", tmp_path / "out", "--json")
     answer = inside("reconstruct", spatial_log, *words)

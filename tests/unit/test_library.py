@@ -19,7 +19,7 @@ from gtsam import Pose3
 from tactile_lab import Contact, Grasp, SlamSettings, TactileSlam
 
 rng, slam = np.random.default_rng(0), TactileSlam(SlamSettings(dimension=2), seed=0)
-for index in range(6):
+for index in range(4):
     contacts = []
     for finger, turn in zip(("FF", "MF", "RF", "LF", "TH"), rng.uniform(0.0, 2.0 * np.pi, 5)):
         normal = np.array([np.cos(turn), np.sin(turn), 0.0])

@@ -16,8 +16,8 @@ from drivers.core.contacts import Array
 from drivers.core.poses import spatial, transform_points
 from tactile_lab.evaluation.consistency.levels import CURVE, LEVELS
 from tactile_lab.slam.shape.surfaces.sampling import (
+    MeshDistances,
     TriangleMesh,
-    distances_to_mesh,
     distances_to_polygon,
     mesh_arrays,
     sample_mesh_with_values,
@@ -104,12 +104,12 @@ def mesh_errors(
     import igl  # here, so that importing this module stays quick
 
     samples_m, stated_m = sample_mesh_with_values(mesh, sigma_m, _SAMPLES)
-    solid = mesh_arrays(truth)
+    solid, distances = mesh_arrays(truth), MeshDistances(truth)
 
     def signed_m(places_m: Array) -> Array:
         places_m = np.ascontiguousarray(places_m)
         within = np.asarray(igl.fast_winding_number(*solid, places_m)) > 0.5
-        return np.asarray(np.where(within, -1.0, 1.0) * distances_to_mesh(places_m, truth))
+        return np.asarray(np.where(within, -1.0, 1.0) * distances.of(places_m))
 
     moved = transform_points(truth_T_estimate, samples_m)
     return signed_m(_settled(moved, stated_m, signed_m, upright=upright)), stated_m

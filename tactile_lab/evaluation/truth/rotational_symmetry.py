@@ -16,7 +16,7 @@ from drivers.core.contacts import Array
 from drivers.core.poses import transform_points
 from tactile_lab.evaluation.trajectory import Poses
 from tactile_lab.slam.doubt.symmetry import ROUND, Symmetry, largest_order, symmetry_of
-from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh
+from tactile_lab.slam.shape.surfaces.sampling import MeshDistances, sample_mesh
 from tactile_lab.slam.shape.surfaces.surface import Contour
 
 ANY_TURN = ROUND
@@ -38,11 +38,11 @@ def symmetry_turns(mesh: trimesh.Trimesh) -> int | None:
         :data:`ANY_TURN` for a round object, a number from 6 on, or None for an object whose rotations can be
         distinguished.
     """
-    points = sample_mesh(mesh, _POINTS)
+    points, distances = sample_mesh(mesh, _POINTS), MeshDistances(mesh)
 
     def stays(turn_rad: float) -> bool:
         turned = transform_points(Pose3(Rot3.Rz(turn_rad), np.zeros(3)), points)
-        return bool(np.mean(distances_to_mesh(turned, mesh) ** 2) < _ALIKE_m**2)
+        return bool(np.mean(distances.of(turned) ** 2) < _ALIKE_m**2)
 
     if all(map(stays, _SOME_TURNS_rad)):
         return ANY_TURN

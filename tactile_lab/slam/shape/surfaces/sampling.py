@@ -105,6 +105,24 @@ def distances_to_mesh(points_m: Array, mesh: TriangleMesh) -> Array:
     return nearest_on_mesh(points_m, mesh)[0]
 
 
+class MeshDistances:
+    """Exact distances to the surface of one mesh, asked for again and again: it is searched through a tree that is
+    made once.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        import igl  # here, so that importing this module stays quick
+
+        self._vertices, self._faces = mesh_arrays(mesh)
+        self._tree = igl.AABB()
+        self._tree.init(self._vertices, self._faces)
+
+    def of(self, points_m: Array) -> Array:
+        """Of points of shape (q, 3), shape (q,)."""
+        squared = self._tree.squared_distance(self._vertices, self._faces, np.ascontiguousarray(points_m))[0]
+        return np.asarray(np.sqrt(squared), dtype=float)
+
+
 def nearest_on_mesh(points_m: Array, mesh: TriangleMesh) -> tuple[Array, Array]:
     """Exact distances from points of shape (q, 3) to the surface of a mesh, and its nearest points, shape (q, 3)."""
     import igl  # here, so that importing this module stays quick

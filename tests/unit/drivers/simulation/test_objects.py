@@ -149,7 +149,12 @@ def check_scan(model: ObjectModel) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["cracker_box", "tomato_soup_can", pytest.param("mustard_bottle", marks=pytest.mark.long)]
+    "name",
+    [
+        "tomato_soup_can",
+        pytest.param("cracker_box", marks=pytest.mark.long),
+        pytest.param("mustard_bottle", marks=pytest.mark.long),
+    ],
 )
 def test_scanned_household_object_is_usable(name: str, lab_data: Path) -> None:
     check_scan(object_model(f"mesh:{lab_data / 'ycb_meshes' / f'ycb_{name}.ply'}"))

@@ -11,6 +11,7 @@ from sessions.recording.session_events import EventKind
 from tactile_lab.autonomy.autonomous_roles import autonomous_roles
 from tactile_lab.slam.slam_settings import SlamSettings
 from tactile_lab.slam.tactile_slam import TactileSlam
+from tactile_lab.slam.tracking.joint.settings import JointSettings
 from tests.support.disc_sessions import Watcher, settings
 from tests.support.disc_world import Disc, DiscWorld
 
@@ -31,7 +32,8 @@ class Falling:
 
 def run(after: Disc | None, grasps: int, watcher: Watcher) -> tuple[SessionOutcome, DiscWorld, TactileSlam]:
     world = DiscWorld(Disc(np.zeros(2), 0.03, STANDING_m), Falling(after))
-    slam = TactileSlam(SlamSettings(dimension=3, shape_model="gpis"), seed=1)
+    joint = JointSettings(without={"faces"})  # a disc has none
+    slam = TactileSlam(SlamSettings(dimension=3, shape_model="gpis", mesh_resolution_m=0.006, joint=joint), seed=1)
     wanted = settings(grasps, probing={"highest_m": 0.2})
     roles = autonomous_roles(world, slam, wanted, seed=3, dimension=3)  # type: ignore[arg-type]
     return Conductor(world, wanted, roles, watcher).run(), world, slam  # type: ignore[arg-type]

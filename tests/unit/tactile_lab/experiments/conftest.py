@@ -6,15 +6,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from tactile_lab.slam.shape.metrics import alignment, metrics, overlap
+from tests.support.coarse_judging import judged_coarsely
 
 
 @pytest.fixture(scope="module", autouse=True)
 def coarse_judging() -> Iterator[None]:
-    """Fewer samples of the surfaces, and the best fit sought from the estimated pose: no run here is upside down."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(alignment, "_PLANAR_STARTS", 1)
-        patch.setattr(alignment, "_MESH_SAMPLES", 1500)
-        patch.setattr(metrics, "MESH_SAMPLES", 5000)
-        patch.setattr(overlap, "_OVERLAP_SAMPLES", 5000)
+    with judged_coarsely():
         yield

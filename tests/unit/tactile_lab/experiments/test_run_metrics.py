@@ -45,7 +45,7 @@ def test_sizes_are_judged_by_their_own_sigma_where_both_ends_were_touched() -> N
 
 @pytest.mark.parametrize("motion", ["table", "free"])
 def test_a_run_has_the_sizes_of_what_stands_on_a_table(motion: Literal["table", "free"]) -> None:
-    data = spatial_data.simulate("ellipsoid", 0, motion=motion, count=4)
+    data = spatial_data.simulate("ellipsoid", 0, motion=motion, count=3)
     result = _known_poses_run(data, 3, "table" if motion == "table" else "space")
     whole = size_figures(result.mesh, np.asarray(data.mesh.vertices))
     assert whole["size_z"]
