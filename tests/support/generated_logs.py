@@ -84,7 +84,7 @@ def logs(draw: st.DrawFn) -> dict[str, Any]:
         "dimension": dimension,
         "point_sigma_m": draw(st.sampled_from([_TINY, _USUAL, _LARGE])),
         "normal_sigma_rad": draw(st.sampled_from([1e-6, 0.09, 3.0])),
-        "grasps": draw(st.lists(_grasp(dimension, origin_m), min_size=1, max_size=5)),
+        "grasps": draw(st.lists(_grasp(dimension, origin_m), min_size=1, max_size=3)),
     }
     if draw(st.booleans()):
         sigmas = st.sampled_from([0.0, _USUAL, _LARGE])
