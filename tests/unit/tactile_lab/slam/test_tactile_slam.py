@@ -96,7 +96,7 @@ def test_the_thesis_s_filter_runs_and_says_which_grasps_it_could_not_place() -> 
 
 
 def test_a_solid_is_followed_and_meshed() -> None:
-    data = spatial_data.simulate("box-12x6x6", 3, count=3)
+    data = spatial_data.simulate("box-12x6x6", 1, count=5)
     result = run(data, dimension=3, mesh_resolution_m=0.01)
     assert registration_mm(data, result) < 6.0
     assert result.mesh is not None
