@@ -11,11 +11,10 @@ from gtsam import Pose3
 
 from drivers.core.contacts import Array, Grasp
 from drivers.core.poses import planar
+from tactile_lab.slam.tracking.contacts.measured_law import as_normal, spread
 from tactile_lab.slam.tracking.contacts.motion import compose, deviation, planar_motion, pose_vector
 
 _LEAST_STEPS = 10
-_FAR = 3.0
-"""A step farther off counts as this far: one object that was dropped must not widen the noise of all."""
 
 
 @dataclass(frozen=True)
@@ -54,8 +53,10 @@ class FeltSlips:
         return np.asarray(self.missed / self.sigmas[:, [0, 0, 1]])
 
     def share_within(self, sigmas: float) -> tuple[float, float]:
-        """Share of translations and of rotations within this many standard deviations."""
-        within = np.abs(self.in_sigma) < sigmas
+        """Share of translations and of rotations within this many sigma of the law of measured steps: as many are to be
+        as of a normal distribution.
+        """
+        within = np.abs(as_normal(self.in_sigma)) < sigmas
         return float(within[:, :2].mean()), float(within[:, 2].mean())
 
     @property
@@ -63,11 +64,11 @@ class FeltSlips:
         """Factor by which the stated standard deviations should be larger; None for too few steps."""
         if len(self.missed) < _LEAST_STEPS:
             return None
-        return float(np.sqrt(np.mean(np.minimum(np.abs(self.in_sigma), _FAR) ** 2)))
+        return spread(self.in_sigma.ravel())
 
     def in_words(self) -> str:
         """How often the error was within the stated one, and what to change."""
         shares = [self.share_within(sigmas) for sigmas in (1, 2, 3)]
         lengths, turns = (" / ".join(f"{100 * share[part]:.0f}" for share in shares) for part in (0, 1))
-        told = f"felt within 1 / 2 / 3 of its own standard deviations: {lengths} % (mm), {turns} % (°)"
+        told = f"felt within 1 / 2 / 3 of its own sigma: {lengths} % (mm), {turns} % (°)"
         return told if self.scale is None else f"{told}; to fit, multiply odometry_scale by {self.scale:.2g}"

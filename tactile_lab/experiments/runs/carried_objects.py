@@ -32,6 +32,7 @@ from tactile_lab.experiments.runs.unrecorded_session import run_unrecorded
 from tactile_lab.rigs.build import build_runtime, simulated_world
 from tactile_lab.rigs.description import Rig, load_rig
 from tactile_lab.slam.tactile_slam import TactileSlam
+from tactile_lab.slam.tracking.contacts.measured_law import as_normal
 from tactile_lab.workflow.running import slam_settings
 
 RIG, MASS_kg = "sim", 0.3
@@ -208,8 +209,8 @@ def carry_object(cell: Cell) -> dict[str, Any]:
 def figures(carries: Sequence[WatchedCarry]) -> dict[str, Any]:
     """Errors of all carries, and of the steps to the next capture, by kind of hand.
 
-    Millimetres and degrees are lists: of the distances for medians, per axis for root mean squares, and over the stated
-    standard deviations.
+    Millimetres and degrees are lists: of the distances for medians, per axis for root mean squares, over the stated
+    standard deviations, and as a normal distribution has them as often as the law of measured steps.
     """
     steps = [each for each in carries if each.later is not None]
     stated = [each for each in steps if each.stated is not None]
@@ -220,7 +221,9 @@ def figures(carries: Sequence[WatchedCarry]) -> dict[str, Any]:
         off = np.array([_error(each, how, each.later) for each in steps]).reshape(-1, 3)
         found |= _errors(f"{name}_step", off)
     shares = np.array([_error(each, AS_MEASURED, each.later) / _sigmas(each.stated) for each in stated]).reshape(-1, 3)
-    return found | {"stated_z_mm": shares[:, :2].ravel().tolist(), "stated_z_deg": shares[:, 2].tolist()}
+    for name, ratios in (("stated", shares), ("law", as_normal(shares))):
+        found |= {f"{name}_z_mm": ratios[:, :2].ravel().tolist(), f"{name}_z_deg": ratios[:, 2].tolist()}
+    return found
 
 
 def _error(carry: WatchedCarry, how: str, true: Pose2 | None) -> Array:

@@ -17,8 +17,6 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array, StepSigma
 from drivers.core.poses import planar, spatial, wrap_angle_rad
 
-_TAIL = 3.0
-"""Half of the degrees of freedom and dimensions of the distribution of measured steps."""
 _LEAST_m, _LEAST_rad = 1e-5, 1e-4
 
 UNHELD = 0.15
@@ -119,19 +117,6 @@ class MeasuredNoise(MotionNoise):
     @property
     def is_heavy_tailed(self) -> bool:
         return True
-
-
-def heavy_tailed_cost(squared: Array) -> Array:
-    """Negative log density of a slip whose length over its standard deviation has this square, up to a constant.
-
-    Student's t, with the curvature of the normal distribution in the middle: 10 sigma cost 9 nats, not 50.
-    """
-    return np.asarray(_TAIL * np.log1p(squared / (2 * _TAIL)))
-
-
-def heavy_tailed_weight(squared: Array) -> Array:
-    """Derivative of :func:`heavy_tailed_cost`, relative to that of the normal distribution's."""
-    return np.asarray(1 / (1 + squared / (2 * _TAIL)))
 
 
 def pose_vector(world_T_object: Pose2) -> Array:

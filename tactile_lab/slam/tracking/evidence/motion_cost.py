@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from drivers.core.contacts import Array, StepSigma
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap, Moved
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise, heavy_tailed_cost, heavy_tailed_weight
+from tactile_lab.slam.tracking.contacts.measured_law import heavy_tailed_cost, heavy_tailed_weight
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PoseVectors
 
 STIFF_BEYOND_SIGMA = 3.2
@@ -86,7 +88,7 @@ class MotionCost:
         slip = self._lengths(scaled)
         excess = np.maximum(slip - self._stiff_beyond, 0.0)
         by_part = 1 + _STIFFNESS * excess / np.maximum(slip, 1e-12)
-        by_part[self._is_heavy] = heavy_tailed_weight(slip[self._is_heavy] ** 2)
+        by_part[self._is_heavy] = heavy_tailed_weight(slip[self._is_heavy] ** 2, self._parts)
         stretch = np.repeat(by_part, self._parts, axis=1)
         pull = scaled * stretch * self._weights
         later, earlier = self._space.slip_derivatives(rows, self._motions)
@@ -114,16 +116,21 @@ class MotionCost:
         return self._lengths(self._scale(rows))
 
     def _trust(self, rows: Array) -> Array:
-        """One over the standard deviation of each component of each step, larger for measured ones that are off."""
+        """One over the standard deviation of each component of each step, which is larger for measured ones that are off.
+
+        Where they are not, it is the stated one, although their law is narrower there: a pose that nothing else tells
+        has the spread of the whole law.
+        """
         if not self._is_heavy.any():
             return self._weights
         trust, slip = self._weights.copy(), self._lengths(self._scale(rows))[self._is_heavy]
-        trust[self._is_heavy] *= np.repeat(np.sqrt(heavy_tailed_weight(slip**2)), self._parts, axis=1)
+        weight = np.minimum(heavy_tailed_weight(slip**2, self._parts), 1.0)
+        trust[self._is_heavy] *= np.repeat(np.sqrt(weight), self._parts, axis=1)
         return trust
 
     def _costs(self, slip: Array, excess: Array) -> Array:
         costs = 0.5 * np.sum(slip**2 + _STIFFNESS * excess**2, axis=1)
-        costs[self._is_heavy] = heavy_tailed_cost(slip[self._is_heavy] ** 2).sum(axis=1)
+        costs[self._is_heavy] = heavy_tailed_cost(slip[self._is_heavy] ** 2, self._parts).sum(axis=1)
         return np.asarray(costs)
 
     def scaled_slips(self, rows: Array) -> Array:
@@ -131,8 +138,8 @@ class MotionCost:
         return self._scale(rows)
 
     @property
-    def _parts(self) -> list[int]:
-        return [self._space.translations, self._space.size - self._space.translations]
+    def _parts(self) -> NDArray[np.int_]:
+        return np.array([self._space.translations, self._space.size - self._space.translations])
 
     def _scale(self, rows: Array) -> Array:
         slips = self._space.deviation(rows[1:], self._space.compose(self._motions[1:], rows[:-1]))

@@ -20,7 +20,8 @@ from drivers.core.configuration import StrictModel
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
-from tactile_lab.slam.tracking.contacts.motion import MotionNoise, heavy_tailed_cost, heavy_tailed_weight
+from tactile_lab.slam.tracking.contacts.measured_law import heavy_tailed_cost, heavy_tailed_weight
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 from tactile_lab.slam.tracking.joint.low_discrepancy import sobol_points
 
@@ -189,9 +190,10 @@ class GraspMatch:
         if not self._is_heavy_tailed:
             return 0.5 * np.sum(away**2, axis=1), np.ones_like(away)
         turns = self._space.translations
+        parts = np.array([turns, self._space.size - turns])
         squared = np.add.reduceat(away**2, [0, turns], axis=1)
-        pull = np.repeat(heavy_tailed_weight(squared), [turns, self._space.size - turns], axis=1)
-        return heavy_tailed_cost(squared).sum(axis=1), pull
+        pull = np.repeat(heavy_tailed_weight(squared, parts), parts, axis=1)
+        return heavy_tailed_cost(squared, parts).sum(axis=1), pull
 
     def _place(self, rows: Array) -> tuple[Array, Array]:
         return self._space.to_object(rows[:, None], self._contacts.points_m, self._contacts.normals)

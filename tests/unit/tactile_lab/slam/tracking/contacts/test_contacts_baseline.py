@@ -12,12 +12,8 @@ from drivers.core.contacts import StepSigma
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet, placement_sigma_m, planar_rotation
 from tactile_lab.slam.tracking.contacts.first_pose import first_pose_vector
 from tactile_lab.slam.tracking.contacts.free_space import free_space_costs
-from tactile_lab.slam.tracking.contacts.motion import (
-    MotionNoise,
-    heavy_tailed_cost,
-    heavy_tailed_weight,
-    sample_motion,
-)
+from tactile_lab.slam.tracking.contacts.measured_law import heavy_tailed_cost, heavy_tailed_weight
+from tactile_lab.slam.tracking.contacts.motion import MotionNoise, sample_motion
 from tactile_lab.slam.tracking.contacts.pose_vectors import PLANAR, PoseVectors
 from tactile_lab.slam.tracking.contacts.spatial_pose_vectors import SPATIAL
 from tests.support.baseline import assert_baseline
@@ -107,11 +103,11 @@ def test_motion_noise() -> None:
         "two still": NOISE.over(steps[2:], [None]),
         "accumulated": NOISE.accumulate(5),
     }
-    squared = np.array([0.0, 0.5, 3.0, 40.0, 900.0])
+    squared, dimensions = np.array([0.0, 0.5, 3.0, 40.0, 900.0]), np.array([1, 2, 3, 1, 2])
     values: dict[str, Any] = {
         name: [*one.sigmas, one.palm_m, one.gripped, one.is_heavy_tailed] for name, one in noises.items()
     }
-    values["tail"] = [heavy_tailed_cost(squared), heavy_tailed_weight(squared)]
+    values["tail"] = [heavy_tailed_cost(squared, dimensions), heavy_tailed_weight(squared, dimensions)]
     values["samples"] = sample_motion(any_rows("plane", 6), carried, NOISE, np.random.default_rng(4))
     values["rotation"] = planar_rotation(0.7)
     assert_baseline("tracking/contacts/motion-noise", values)

@@ -31,12 +31,12 @@ def cost_of(slip: Array, measured: tuple[StepSigma | None, ...] = (None, None, O
 
 
 def test_a_small_slip_costs_what_its_own_noise_says() -> None:
-    assert cost_of(np.array([0.001, 0.0, 0.0])) == pytest.approx(0.5, rel=0.1)
+    assert cost_of(np.array([0.001, 0.0, 0.0])) == pytest.approx(3.5 * np.log(4 / 3))
     assert cost_of(np.array([0.001, 0.0, 0.0]), (None, None, None)) == pytest.approx(0.005)
 
 
 def test_a_step_that_is_off_by_ten_sigma_can_still_be_believed() -> None:
-    assert 7 < cost_of(np.array([0.010, 0.0, 0.0])) < 10
+    assert 10 < cost_of(np.array([0.010, 0.0, 0.0])) < 15
 
 
 def test_the_gradient_is_the_derivative_of_the_value() -> None:
@@ -84,7 +84,7 @@ def test_poses_are_searched_where_an_unmeasured_step_may_lead() -> None:
     noise = USUAL.after(np.ones(3), OWN)
     found, _ = propose(predicted, last.contacts_world, field, noise, ProposalSettings())
     nearest = np.linalg.norm((found - last.pose)[:, :2], axis=1).min()
-    assert nearest < 0.003
+    assert nearest < 0.0035
     match = GraspMatch(predicted, last.contacts_world, field, noise, ProposalSettings())
     fit = match.fit(last.pose[None], match.variance(last.pose[None]))
     assert np.isfinite(fit.cost).all()
