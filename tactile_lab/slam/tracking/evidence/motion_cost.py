@@ -116,7 +116,7 @@ class MotionCost:
         return self._lengths(self._scale(rows))
 
     def _trust(self, rows: Array) -> Array:
-        """One over the standard deviation of each component of each step, which is larger for measured ones that are off.
+        """One over the standard deviation of each component of each step, larger for measured ones that are off.
 
         Where they are not, it is the stated one, although their law is narrower there: a pose that nothing else tells
         has the spread of the whole law.
