@@ -16,6 +16,8 @@ from drivers.core.contacts import Array
 _FREEDOM = 5.0
 _SCALE = float(np.sqrt((_FREEDOM - 2) / _FREEDOM))
 """Of Student's t whose standard deviation is 1."""
+_FEW = 0.17
+"""Of so small a share that is not 0 the most likely spread is 0."""
 
 
 def heavy_tailed_cost(squared: Array, dimensions: NDArray[np.int_]) -> Array:
@@ -42,9 +44,12 @@ def as_normal(ratios: Array) -> Array:
 
 
 def spread(ratios: Array) -> float:
-    """The most likely standard deviation of errors that follow the law, shape (n,); far ones hardly widen it."""
-    squared = np.square(ratios)
-    if not (largest := float(squared.max())):
+    """The most likely standard deviation of errors that follow the law, shape (n,); far ones hardly widen it. 0 where
+    few are off at all.
+    """
+    largest = float(np.abs(ratios).max()) or 1.0
+    squared = np.square(ratios / largest)
+    if np.count_nonzero(squared) <= _FEW * len(squared):
         return 0.0
 
     def excess(variance: float) -> float:
@@ -52,4 +57,4 @@ def spread(ratios: Array) -> float:
         over = squared / variance
         return float(np.mean((_FREEDOM + 1) * over / (_FREEDOM - 2 + over))) - 1
 
-    return float(np.sqrt(brentq(excess, 1e-9 * largest, 2 * largest)))
+    return largest * float(np.sqrt(brentq(excess, 1e-3 * squared[squared > 0].min(), 2.0)))

@@ -43,3 +43,10 @@ def test_the_spread_is_the_standard_deviation_and_a_far_one_hardly_widens_it(sig
     errors = sigma * np.sqrt(3 / 5) * np.random.default_rng(seed).standard_t(5, 400)
     assert spread(errors) == pytest.approx(sigma, rel=0.3)
     assert spread(np.append(errors, 100 * sigma)) == pytest.approx(spread(errors), rel=0.03)
+
+
+@given(st.integers(1, 60), st.floats(1e-150, 1e150))
+def test_any_errors_have_a_spread(off: int, size: float):
+    errors = np.zeros(60)
+    errors[:off] = size
+    assert spread(errors) == 0.0 if off <= 10 else spread(errors) <= 1.3 * size
