@@ -64,6 +64,8 @@ class FeltObject:
     grasps: int = 0
     _points_m: Array = field(default_factory=_nowhere)
     _normals: Array = field(default_factory=_nowhere)
+    """Of all contacts, as their places: shape (n, 3), world frame."""
+
     _looked_m: dict[bool, Array] = field(default_factory=lambda: {True: _nowhere(), False: _nowhere()})
     """Places on the top, and on sides."""
 
@@ -104,7 +106,7 @@ class FeltObject:
         self._points_m, self._normals = np.vstack([self._points_m, points_m]), np.vstack([self._normals, normals])
         if not len(self._points_m):
             return
-        points_m, normals = self._contacts()
+        points_m, normals = self._points_m, self._normals
         top_m = max(self.box.top_m or 0.0, float(points_m[:, 2].max()))
         beside = self._is_outside(points_m, normals)
         if np.count_nonzero(beside) >= _LEAST_FOR_BOX:
@@ -187,17 +189,13 @@ class FeltObject:
     @property
     def storeys(self) -> Storeys:
         """The box, narrower at heights where contacts say so."""
-        points_m, normals = self._contacts()
+        points_m, normals = self._points_m, self._normals
         return storeys_of(self.box, points_m, normals, self._is_outside(points_m, normals))
-
-    def _contacts(self) -> tuple[Array, Array]:
-        """Places and normals of all contacts, shape (n, 3) each, world frame."""
-        return self._points_m, self._normals
 
     @property
     def is_round(self) -> bool:
         """Whether contacts say that the box is no box; see :func:`is_round`."""
-        points_m, normals = self._contacts()
+        points_m, normals = self._points_m, self._normals
         beside, yaw_rad = on_sides(normals), self.box.world_T_box.theta()
         if np.count_nonzero(beside) < _LEAST_FOR_BOX:
             return False
@@ -219,7 +217,7 @@ class FeltObject:
         """Of places (n, 3) of the top or of sides to the nearest where a contact was that faces so, or was expected
         before, shape (n,), at most 40 mm. What lies below an edge is not known from above it.
         """
-        points_m, normals = self._contacts()
+        points_m, normals = self._points_m, self._normals
         facing = normals[:, 2] > _NO_SIDE if on_top else normals[:, 2] < _UPWARD
         return np.minimum(self._apart_m(places_m, np.vstack([points_m[facing], self._looked_m[on_top]])), _FAR_m)
 
@@ -276,7 +274,7 @@ class FeltObject:
     @property
     def top_place_m(self) -> Array:
         """Where its top was met, world x, y; the middle of the box where it was not."""
-        points_m, normals = self._contacts()
+        points_m, normals = self._points_m, self._normals
         on_top = (normals[:, 2] > _UPWARD) & (points_m[:, 2] > (self.box.top_m or 0.0) - _NEAR_m)
         return np.asarray(points_m[on_top, :2].mean(axis=0)) if on_top.any() else self.middle_m
 

@@ -78,7 +78,7 @@ def test_every_contact_lies_in_them_and_none_is_wider_than_the_one_below(
 ) -> None:
     known = felt((0.05, 0.05))
     storeys = touch(known, [contact[:3] for contact in contacts], [FACES[contact[3]] for contact in contacts])
-    points, _ = known._contacts()
+    points = known._points_m
     assert storeys.distances_m(points).max() < 1e-6
     sizes = np.array([box.size_m for box in storeys.boxes])
     assert (np.diff(sizes[:, 2]) > -1e-9).all()
