@@ -80,7 +80,7 @@ class Carrier:
 
         Its mass is measured once: a hand's errors are the same every time. What was too heavy twice is lifted no more.
         """
-        roles, is_known = self._roles, self._runtime.perception.properties.mass_kg is not None
+        roles, is_known = self._roles, self._runtime.perception.properties.hung_free
         if roles.weigh is None or is_known or self._too_heavy >= _TRIES:
             return True
         if not roles.decisions.may_weigh(roles.performer.plan):

@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 
 from drivers.core.contacts import Array
-from sessions.perception.weighing.object_properties import Value
+from sessions.perception.weighing.value import Value
 
 _SHARE = 0.1
 """Of its sigma by which the surface is moved: a guess between contacts may be farther out than the object is wide."""

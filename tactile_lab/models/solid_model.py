@@ -15,7 +15,7 @@ import trimesh
 
 from drivers.core.contacts import Array
 from drivers.core.errors import SessionDataError, given_by_a_person
-from sessions.perception.weighing.object_properties import Value
+from sessions.perception.weighing.value import Value
 from tactile_lab.evaluation.files.mesh_io import read_estimated_mesh
 from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.files.tables import RERUN

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sessions.perception.weighing.object_properties import Value
+from sessions.perception.weighing.value import Value
 from tactile_lab.evaluation.table import UNKNOWN, size_in_words
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent, Surface

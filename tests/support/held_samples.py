@@ -13,6 +13,27 @@ CENTRE_m, HEIGHT_m = np.array([0.4, -0.02]), 0.05
 """Where the weight hangs at first."""
 
 
+JOINT_SIGMA_rad = float(np.radians(0.6))
+
+
+class PlainTip:
+    """Its readings are the wrench about the distal origin, without weight and bias."""
+
+    drift = np.array([0.01, 0.01, 0.01, 5e-5, 5e-5, 5e-5])
+
+    def reading(self):
+        return self.wrench
+
+    def wrenches(self, readings, world_R_distal):
+        return readings
+
+    def __init__(self):
+        self.wrench = np.zeros(6)
+
+
+TIPS = {finger: PlainTip() for finger in FINGERS}
+
+
 def held_samples(
     pull_N: float, upward_N: float, *, tilted: float = 0.0, uneven: float = 0.0, swing: float = 0.0
 ) -> CarrySamples:

@@ -10,20 +10,14 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.core.fingertip import GRAVITY
 from sessions.perception.carrying.friction_balance import MeasuredFriction
+from sessions.perception.weighing.table_pull import weight_on_edges
+from sessions.perception.weighing.value import Value
 from sessions.perception.weighing.weighing import Dragging, Hanging
 
 _LEAST_SLIDING = 40
 """Sliding contacts that are needed to tell their friction: 0.8 s of one fingertip."""
 _SLIDING_SHARE = 0.9
 """Quantile of the force ratios at contacts that slide: some only seem to, and lie below the cone."""
-
-
-@dataclass(frozen=True)
-class Value:
-    """A measured number and its standard deviation."""
-
-    value: float
-    sigma: float
 
 
 @dataclass(frozen=True)
@@ -73,7 +67,7 @@ class ObjectProperties:
     def in_words(self) -> str:
         """What is known, for people."""
         values = [
-            ("mass", self.mass_kg, 1e3, "g", 0),
+            ("mass" if self.hung_free else "mass, of what stood on an edge,", self.mass_kg, 1e3, "g", 0),
             ("table's friction", self.table_friction_N, 1.0, "N", 2),
             ("coefficient of the table", self.table_friction, 1.0, "", 2),
         ]
@@ -87,9 +81,14 @@ class ObjectProperties:
         return ", ".join(told) or "nothing is known of its weight and friction"
 
     @property
+    def hung_free(self) -> bool:
+        """Whether nothing but the fingertips held it once: its mass is known as well as this hand can tell."""
+        return bool(self._free)
+
+    @property
     def mass_kg(self) -> Value | None:
-        """Mass; None if the object never hung free."""
-        weight = _mean([Value(each.weight_N, each.weight_sigma_N) for _, each in self._free])
+        """Mass, of an object that never hung free by how the table held it back on its edge; None if that is unsure."""
+        weight = _mean([Value(each.weight_N, each.weight_sigma_N) for _, each in self._free]) or self._on_edges_N
         return None if weight is None else Value(weight.value / GRAVITY, weight.sigma / GRAVITY)
 
     @property
@@ -136,6 +135,12 @@ class ObjectProperties:
             tips_at_least=self.tip_friction_at_least or 0.0,
             weight_N=float("nan") if mass is None else GRAVITY * mass.value,
         )
+
+    @property
+    def _on_edges_N(self) -> Value | None:
+        dragged = [each.pull for _, each in self.draggings if each.pull is not None]
+        tipped = [each.pull for _, each in self.hangings if each.is_tipped and each.pull is not None]
+        return weight_on_edges(dragged, tipped)
 
     @property
     def _free(self) -> list[tuple[int, Hanging]]:

@@ -14,6 +14,7 @@ from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_record import CarrySamples
 from sessions.perception.carrying.net_wrench import NetWrench, net_wrench
 from sessions.perception.weighing.joint_errors import STEP_rad, joint_errors, turned_wrenches
+from sessions.perception.weighing.table_pull import TablePull, table_pull, there_and_back
 
 _GAIN = 0.01
 """Error of each force sensor's gain: 1 % of the reading (protocols: Nano17 ratings)."""
@@ -30,6 +31,8 @@ _UNSTEADY_N, _UNSTEADY_SHARE = 0.02, 0.01
 """By how much the upward force on an object that hangs free varies; an edge on the table slips and catches."""
 _SIDEWAYS_SIGMAS = 4.0
 """A force along the table that is larger than this, in standard deviations, is no error of the joint angles."""
+_LEANED_SIGMAS = 25.0
+"""Nor one of an edge on the table, which gives way: links carry much of it then."""
 _SMOOTHING, _SLIP_SMOOTHING = 1.0, 3.0
 """Samples; of the upward force, against noise."""
 _SLIPS_N, _SLIPS_SHARE = 0.05, 0.02
@@ -37,8 +40,6 @@ _SLIPS_N, _SLIPS_SHARE = 0.05, 0.02
 _LEAST_SAMPLES = 20
 _SLIDING_QUANTILE = 0.6
 """The dragged object lags behind when the hand turns round: the stronger pulls are those at which it slides."""
-_SPEED_SHARE = 0.5
-"""Share of the largest speed below which the hand counts as turning round."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ class Hanging:
         unsteady_N: standard deviation of the upward force in time.
         sideways_sigmas: force of the fingertips along the table, in its standard deviations: as large as that of links,
             which feel nothing, against the object.
+        pull: how the table held it back; None if it was not moved both ways.
     """
 
     weight_N: float
@@ -62,6 +64,7 @@ class Hanging:
     held_back_N: float
     unsteady_N: float = 0.0
     sideways_sigmas: float = 0.0
+    pull: TablePull | None = None
 
     @property
     def stands(self) -> bool:
@@ -73,6 +76,11 @@ class Hanging:
     def is_leaned_on(self) -> bool:
         """Whether links of the fingers carry a part of it."""
         return self.sideways_sigmas > _SIDEWAYS_SIGMAS
+
+    @property
+    def is_tipped(self) -> bool:
+        """Whether table and fingertips share it, without much help of links."""
+        return self.stands and self.sideways_sigmas < _LEANED_SIGMAS
 
     @property
     def is_free(self) -> bool:
@@ -87,11 +95,13 @@ class Dragging:
     Attributes:
         friction_N, friction_sigma_N: of the table.
         pressed_N: by how much the fingers pressed it onto the table.
+        pull: friction and upward force in the mean; None if it was not moved both ways.
     """
 
     friction_N: float
     friction_sigma_N: float
     pressed_N: float
+    pull: TablePull | None = None
 
 
 def hanging(
@@ -128,6 +138,7 @@ def hanging(
         held_back_N=abs(_held_back_N(found)),
         unsteady_N=float(gaussian_filter1d(found.force_N[:, 2], _SMOOTHING, mode="nearest").std()),
         sideways_sigmas=float(np.linalg.norm(best[3:] / sigma[3:])),
+        pull=table_pull(found),
     )
 
 
@@ -146,7 +157,8 @@ def dragging(samples: CarrySamples, fingertips: Mapping[str, ContinuousFingertip
     """Friction of the table on an object that was dragged to and fro during these samples."""
     found = net_wrench(samples, fingertips, side)
     friction_N = _held_back_N(found, _SLIDING_QUANTILE)
-    return Dragging(friction_N, float(np.hypot(_DRAG_N, _DRAG_SHARE * friction_N)), -float(found.force_N[:, 2].mean()))
+    sigma_N = float(np.hypot(_DRAG_N, _DRAG_SHARE * friction_N))
+    return Dragging(friction_N, sigma_N, -float(found.force_N[:, 2].mean()), table_pull(found))
 
 
 def _measured(wrench: NetWrench, height_m: float) -> Array:
@@ -181,11 +193,7 @@ def _held_back_N(wrench: NetWrench, quantile: float = 0.5) -> float:
         wrench: of the fingertips.
         quantile: of the pull in each direction that counts, reckoned from the weakest.
     """
-    speed = np.gradient(wrench.palm_m[:, :2], axis=0)
-    way = np.linalg.svd(wrench.palm_m[:, :2] - wrench.palm_m[:, :2].mean(axis=0))[2][0]
-    along, pull_N = speed @ way, wrench.force_N[:, :2] @ way
-    fast = _SPEED_SHARE * np.quantile(np.abs(along), 0.9)
-    there, back = along > fast, along < -fast
+    pull_N, there, back = there_and_back(wrench)
     if not (there.any() and back.any()):
         return 0.0
     return float((np.quantile(pull_N[there], quantile) - np.quantile(pull_N[back], 1.0 - quantile)) / 2)

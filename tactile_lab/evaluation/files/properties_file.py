@@ -15,7 +15,8 @@ from drivers.core.atomic_files import write_whole
 from drivers.core.contacts import Array
 from drivers.core.errors import SessionError
 from drivers.core.poses import planar
-from sessions.perception.weighing.object_properties import ObjectProperties, Value
+from sessions.perception.weighing.object_properties import ObjectProperties
+from sessions.perception.weighing.value import Value
 from tactile_lab.evaluation.files.plain import json_text, read_json_object
 from tactile_lab.evaluation.inertia import EvenBody, PrincipalInertia
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh

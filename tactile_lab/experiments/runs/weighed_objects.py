@@ -8,7 +8,8 @@ import numpy as np
 
 from drivers.simulation.surfaces import GLASS
 from sessions.conductor.session_outcome import SessionOutcome
-from sessions.perception.weighing.object_properties import ObjectProperties, Value
+from sessions.perception.weighing.object_properties import ObjectProperties
+from sessions.perception.weighing.value import Value
 from tactile_lab.experiments.cells import Cell
 from tactile_lab.experiments.runs.carried_objects import CarryWatch, watch_carries
 
@@ -18,11 +19,14 @@ def weigh_object(cell: Cell) -> dict[str, Any]:
     grasps, mass_kg = int(cell["grasps"]), float(cell["mass_kg"])
     outcome, watch = watch_carries(str(cell["object"]), cell.seed, grasps, mass_kg, grasps)
     known = outcome.properties
-    mass_off = _off("mass", known.mass_kg, mass_kg, mass_kg / 100)
+    is_tipped = known.mass_kg is not None and not known.hung_free
+    mass_off = _off("mass", known.mass_kg if known.hung_free else None, mass_kg, mass_kg / 100)
     return {
         "ending": str(outcome.ending),
-        "weighed": known.mass_kg is not None,
+        "weighed": known.hung_free,
         **mass_off,
+        "tipped": is_tipped,
+        **_off("tipped_mass", known.mass_kg if is_tipped else None, mass_kg, mass_kg / 100),
         "worst_mass_off": max(mass_off["mass_off"], default=None),
         **_off("table", known.table_friction, GLASS.friction[0], 1.0),
         **_centre_off(known, outcome, watch),

@@ -39,7 +39,7 @@ class Bench:
         end=LiftEnd.HUNG,
         slipped=None,
         heard=None,
-        mass_kg=None,
+        hung_free=False,
         allowed_N=2.0,
     ):
         self.done, self.told, self.logged, self.motions = [], [], [], []
@@ -58,7 +58,7 @@ class Bench:
             weigh=(lambda touching: self.done.append("weigh") or Lift(end, 2.6, 0.8, allowed_N)) if can_weigh else None,
             forecast=lambda grasp, turn, shift: self.done.append("forecast") or forecast,
         )
-        properties = SimpleNamespace(in_words=lambda: "mass 300 g", mass_kg=mass_kg)
+        properties = SimpleNamespace(in_words=lambda: "mass 300 g", hung_free=hung_free)
         runtime = SimpleNamespace(
             perception=SimpleNamespace(carry=carry, heard_slip=heard, properties=properties, hand_motion=FELT),
             log=lambda level, source, text: self.logged.append(text),
@@ -108,7 +108,7 @@ def test_it_is_weighed_before_it_is_carried_unless_a_person_objects():
 
 
 def test_what_has_been_weighed_is_not_weighed_again_and_nobody_is_asked():
-    bench = Bench(mass_kg=0.3, may_weigh=False).carry(weighed=True)
+    bench = Bench(hung_free=True, may_weigh=False).carry(weighed=True)
     assert bench.done == ["forecast", "squeeze", "squeeze", "re-orient", "re-orient"]
     assert bench.told == []
 

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from sessions.perception.weighing.object_properties import Value
+from sessions.perception.weighing.value import Value
 from tactile_lab.evaluation.inertia import EvenBody, PrincipalInertia
 
 SIDES_m = np.array([0.12, 0.08, 0.05])

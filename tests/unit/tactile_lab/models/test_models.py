@@ -16,7 +16,7 @@ import yourdfpy
 from pxr import Usd, UsdGeom, UsdPhysics
 
 from drivers.core.errors import ConfigurationError, SessionDataError
-from sessions.perception.weighing.object_properties import Value
+from sessions.perception.weighing.value import Value
 from tactile_lab.evaluation.files.mesh_io import write_ply
 from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.prism import prism

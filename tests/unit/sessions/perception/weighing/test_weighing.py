@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from drivers.core.contacts import FINGERS
 from drivers.core.errors import SessionError
 from drivers.core.fingertip import GRAVITY
 from drivers.shadow.model.kinematics import JOINTS
@@ -18,28 +17,9 @@ from sessions.perception.weighing.object_properties import ObjectProperties
 from sessions.perception.weighing.scales import Scales
 from sessions.perception.weighing.weighing import Dragging, dragging, hanging, until_it_slips
 from sessions.recording.session_events import EventKind, SessionEvent
-from tests.support.held_samples import CENTRE_m, HEIGHT_m, held_samples
+from tests.support.held_samples import TIPS, CENTRE_m, HEIGHT_m, JOINT_SIGMA_rad, held_samples
 
 MASS_kg = 0.3
-JOINT_SIGMA_rad = float(np.radians(0.6))
-
-
-class PlainTip:
-    """Its readings are the wrench about the distal origin, without weight and bias."""
-
-    drift = np.array([0.01, 0.01, 0.01, 5e-5, 5e-5, 5e-5])
-
-    def reading(self):
-        return self.wrench
-
-    def wrenches(self, readings, world_R_distal):
-        return readings
-
-    def __init__(self):
-        self.wrench = np.zeros(6)
-
-
-TIPS = {finger: PlainTip() for finger in FINGERS}
 
 
 def test_what_hangs_free_is_weighed_and_its_centre_found():
