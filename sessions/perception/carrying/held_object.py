@@ -13,7 +13,7 @@ from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry import Carry, CarryOdometry
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.force_delay import ForceDelay
-from sessions.perception.carrying.given_way import given_way_m
+from sessions.perception.carrying.given_way import given_way_m, pushed_open_m
 from sessions.perception.carrying.links.watched_links import WatchedLinks
 from sessions.perception.carrying.net_wrench import largest_net_N
 from sessions.perception.carrying.slip import Slip, slip
@@ -58,7 +58,7 @@ class HeldObject:
         """
 
         self.given_way_m, self._moved_m = 0.0, 0.0
-        """How far the object moved under the fingertips of the last closing, and most since the last grasp."""
+        """How far the object moved under the fingertips of the last closing, and most since it was let go."""
         self.contact_height_m = 0.0
         """Mean height of the last capture's contacts above the table."""
         self.carry: Carry | None = None
@@ -84,7 +84,11 @@ class HeldObject:
         self._record.end()
         self.links.on_tare(stamp_ns)
         if self._is_grasped:
-            self._moved_m, self._is_grasped = 0.0, False
+            self._moved_m, self._is_grasped = self._pushed_open_m(), False
+
+    def _pushed_open_m(self) -> float:
+        opened = self.links.opened
+        return 0.0 if opened is None else pushed_open_m(tip_steps(opened, self.fingertips, self._side))
 
     def on_close(self, stamp_ns: int) -> None:
         """The fingers begin to close; the object may be pushed."""

@@ -69,7 +69,7 @@ class LinkPushes:
         """How long links of fingers that have let go pushed in this opening, until the hand rises; the fingers' times
         added.
         """
-        opening = _until_it_rises(samples)
+        opening = until_it_rises(samples)
         return 0.0 if opening is None else self._pushed_s(opening, self._openings)
 
     def _pushed_s(self, samples: CarrySamples, before: deque[Closing]) -> float:
@@ -114,7 +114,7 @@ def _way_down(samples: CarrySamples) -> CarrySamples | None:
     return samples.until(int(samples.stamps_ns[lowest[-1]]))
 
 
-def _until_it_rises(samples: CarrySamples) -> CarrySamples | None:
+def until_it_rises(samples: CarrySamples) -> CarrySamples | None:
     """Until the hand is above where it let go; None for too little."""
     heights_m = samples.world_T_forearm[:, 2, 3]
     above = np.flatnonzero(heights_m > heights_m[0] + _LOWEST_m)

@@ -14,7 +14,7 @@ from drivers.shadow.model.motors import MotorMap
 from drivers.shadow.protocol.palm_images import Side
 from sessions.perception.carrying.carry_noise import LinkTimes
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
-from sessions.perception.carrying.links.link_pushes import LinkPushes
+from sessions.perception.carrying.links.link_pushes import LinkPushes, until_it_rises
 
 
 class WatchedLinks:
@@ -28,10 +28,12 @@ class WatchedLinks:
 
     def __init__(self, motors: MotorMap | None, fingertips: Mapping[str, ContinuousFingertip], side: Side) -> None:
         self._pushes = None if motors is None else LinkPushes(motors, fingertips, side)
-        self._descent, self._opening = (CarryRecord({} if motors is None else fingertips) for _ in range(2))
+        self._descent, self._opening = CarryRecord({} if motors is None else fingertips), CarryRecord(fingertips)
         self._tared_ns, self._let_go_ns, self._is_grasped = 0, 0, False
         self.times = LinkTimes()
         """Of the step that the last closing ended."""
+        self.opened: CarrySamples | None = None
+        """What the hand measured while it opened last, until it rose; None for too little."""
 
     @property
     def are_heard(self) -> bool:
@@ -67,7 +69,8 @@ class WatchedLinks:
         """The hand is no longer at the object: whatever links pushed since it was let go of counts."""
         if self._is_grasped:
             opening = self._opening.since(self._let_go_ns) if self._opening.is_open else None
-            opened_s = 0.0 if opening is None or self._pushes is None else self._pushes.opened_s(opening)
+            self.opened = None if opening is None else until_it_rises(opening)
+            opened_s = 0.0 if self.opened is None or self._pushes is None else self._pushes.opened_s(self.opened)
             self.times, self._is_grasped = LinkTimes(opened_s=opened_s), False
         self._opening.end()
         self._descent.end()

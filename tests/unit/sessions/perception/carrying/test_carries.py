@@ -272,7 +272,9 @@ def test_an_object_from_closing_to_release() -> None:
     told["height_m"], told["half way"] = held.contact_height_m, plain(held.carried_until(300_000_000))
     told["on"], told["watched"] = plain(held.end_hold(440_000_000)), held.is_watched
     move(45, 60)
-    told["end"], told["left"] = plain(held.end_hold()), held.is_watched
+    told["end"] = plain(held.end_hold())
+    held.on_left()
+    told["left"] = held.is_watched
     told["samples"] = None if held.samples is None else len(held.samples.stamps_ns)
     told["closed"] = [held.then_closed(None), vars(held.then_closed(StepSigma(0.001, 0.02)) or ())]
     assert_baseline("sessions/carrying/held", told, rtol=1e-5, atol=1e-8)

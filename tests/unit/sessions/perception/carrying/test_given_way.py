@@ -10,7 +10,7 @@ from gtsam import Pose2
 
 from drivers.core.contacts import StepSigma
 from sessions.perception.carrying.carry import CarryOdometry
-from sessions.perception.carrying.given_way import given_way_m
+from sessions.perception.carrying.given_way import given_way_m, pushed_open_m
 from sessions.perception.perception import Perception
 from sessions.recording.session_events import EventKind
 from tests.support.held_objects import BOX, carried
@@ -40,6 +40,30 @@ def test_a_fingertip_that_sinks_in_moves_nothing() -> None:
     sinking = np.full(steps.sinking.shape, 8.0 / 50)  # units of its give of 0.3 mm: 2.4 mm in all
     moves_m = steps.moves_m - 0.0003 * sinking[..., None] * steps.normals
     assert given_way_m(replace(steps, sinking=sinking, moves_m=moves_m)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("moved", "force_N", "expected_m"),
+    [
+        (Pose2(0.0, -0.002, 0.0), 0.5, 0.0018),
+        (Pose2(0.0, 0.002, 0.0), 0.5, 0.0),
+        (Pose2(0.0, -0.002, 0.0), 0.2, 0.0),
+        (Pose2(0.002, 0.0, 0.0), 0.5, 0.0),
+    ],
+    ids=["into the object", "away from it", "hardly touching", "along its side"],
+)
+def test_a_fingertip_that_goes_on_into_the_object_while_the_hand_opens_pushes_it(
+    moved: Pose2, force_N: float, expected_m: float
+) -> None:
+    steps = carried(BOX, object_motion=moved, palm_motion=Pose2(), felt=("FF",), count=50)
+    opening = replace(steps, forces_N=force_N * steps.felt)
+    assert pushed_open_m(opening) == pytest.approx(expected_m, rel=0.1)
+
+
+def test_fingertips_that_just_let_go_push_nothing() -> None:
+    steps = carried(BOX, object_motion=Pose2(0.0, -0.002, 0.0), palm_motion=Pose2(), felt=("FF",), count=50)
+    early = np.where(np.cumsum(steps.step_s)[:, None] < 0.12, 0.5 * steps.felt, 0.0)
+    assert pushed_open_m(replace(steps, forces_N=early)) == 0.0
 
 
 def test_what_gave_way_has_moved_and_turned_by_as_much_as_that_allows() -> None:

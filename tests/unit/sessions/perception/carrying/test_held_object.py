@@ -14,6 +14,7 @@ from sessions.perception.carrying.carry import Carry
 from sessions.perception.carrying.carry_record import LONGEST_SAMPLES, CarryRecord
 from sessions.perception.carrying.held_object import HeldObject
 from sessions.perception.hand_odometry import HandOdometry
+from sessions.perception.touch_capture import Measured
 
 CYCLE_ns = 10_000_000
 STILL = np.zeros(len(JOINTS))
@@ -49,9 +50,7 @@ def held(tips=None):
 
 def carry_by(watched, shift_m, count=60, first=0):
     for n in range(first, first + count):
-        forearm = np.eye(4)
-        forearm[:3, 3] = [shift_m * (n - first) / (count - 1), 0.0, 0.3]
-        watched.on_hand(n * CYCLE_ns, STILL, forearm)
+        watched.on_hand(n * CYCLE_ns, STILL, forearm(shift_m * (n - first) / (count - 1), 0.0))
 
 
 def test_what_is_felt_between_capture_and_release_is_one_carry():
@@ -62,8 +61,38 @@ def test_what_is_felt_between_capture_and_release_is_one_carry():
     watched.on_hold(10 * CYCLE_ns)
     carry = watched.end_hold()
     assert carry.motion.x() == pytest.approx(0.03, abs=0.004)
-    assert not watched.is_watched
     assert watched.carry is carry
+
+
+def test_the_hand_is_watched_until_it_has_opened_and_left():
+    watched = held()
+    watched.on_capture(0)
+    carry_by(watched, 0.03)
+    watched.end_hold()
+    assert watched.is_watched
+    watched.on_left()
+    assert not watched.is_watched
+
+
+@pytest.mark.parametrize("opened_m", [0.0, 0.003])
+def test_a_fingertip_that_touches_the_object_while_the_hand_opens_may_have_pushed_it(opened_m):
+    watched = held()
+    watched.on_capture(0)
+    carry_by(watched, 0.0)
+    watched.on_grasp(Measured(0, np.eye(4), (), ()))
+    watched.end_hold()
+    for n in range(60, 121):
+        watched.on_hand(n * CYCLE_ns, STILL, forearm(0.0, -opened_m * (n - 60) / 60))
+    watched.on_tare(121 * CYCLE_ns)
+    known = watched.then_closed(StepSigma(0.0003, 0.005))
+    felt_m = 0.8 * opened_m  # the first 0.12 of 0.6 s are those of fingertips that let go
+    assert known.translation_m == pytest.approx(np.hypot(0.0003, felt_m), rel=0.05)
+
+
+def forearm(x_m, y_m):
+    found = np.eye(4)
+    found[:3, 3] = [x_m, y_m, 0.3]
+    return found
 
 
 def test_an_object_that_was_left_is_not_watched():
