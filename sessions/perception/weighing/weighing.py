@@ -138,7 +138,7 @@ def hanging(
         held_back_N=abs(_held_back_N(found)),
         unsteady_N=float(gaussian_filter1d(found.force_N[:, 2], _SMOOTHING, mode="nearest").std()),
         sideways_sigmas=float(np.linalg.norm(best[3:] / sigma[3:])),
-        pull=table_pull(found),
+        pull=table_pull(felt),
     )
 
 

@@ -104,6 +104,15 @@ def test_a_free_lift_counts_alone():
     assert "of what stood on an edge" not in found.in_words()
 
 
+def test_joint_errors_of_what_hangs_free_are_none_of_an_edge_that_slips_and_catches():
+    samples = held_samples(0.4, 2.8, swing=0.3)
+    samples.readings[15:25] *= 0.8
+    tipped = hanging(samples, TIPS, "right", JOINT_SIGMA_rad, HEIGHT_m)
+    as_measured = net_wrench(samples, TIPS, "right")
+    assert tipped.pull == table_pull(as_measured)
+    assert abs(tipped.weight_N - as_measured.force_N[:, 2].mean()) > 0.01
+
+
 def test_an_edge_on_which_links_lean_hard_does_not_count():
     tipped = hung(2.8, FRICTION * (WEIGHT_N - 2.8))
     assert tipped.is_tipped
