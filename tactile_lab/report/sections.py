@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sessions.perception.weighing.value import Value
+from tactile_lab.evaluation.files.properties_file import MeasuredBody
 from tactile_lab.evaluation.table import UNKNOWN, size_in_words
 from tactile_lab.report import figures
 from tactile_lab.report.content import ReportContent, Surface
@@ -79,7 +79,7 @@ def key_figures(content: ReportContent) -> Markup:
         ("Mean distance", number(shape.get("mean_distance_mm")), "mm", _best(best.get("mean_distance_mm"))),
         ("F-score at 1 mm", number(shape.get("fscore_1mm"), 3), "", _best(best.get("fscore_1mm"), 3, "")),
         *_size_tiles(evaluation.get("dimensions") or ()),
-        *_mass_tile(content.measured.mass_kg),
+        *_mass_tile(content.measured),
         ("Position error", number(pose.get("rmse_mm")), "mm", _at_end(pose, "final_mm")),
         ("Rotation error", number(pose.get("rmse_deg")), "°", _at_end(pose, "final_deg")),
         ("Grasps", str(grasps), "", f"{placed} placed, {contacts} contacts"),
@@ -100,11 +100,12 @@ def _size_tile(extent: Mapping[str, Any]) -> tuple[str, str, str]:
     return value, "mm", "; ".join(words for words in told if words)
 
 
-def _mass_tile(mass_kg: Value | None) -> list[tuple[str, str, str, str]]:
-    if mass_kg is None:
+def _mass_tile(measured: MeasuredBody) -> list[tuple[str, str, str, str]]:
+    if (mass_kg := measured.mass_kg) is None:
         return []
     told = f"{1e3 * mass_kg.value:.0f} \u00b1 {2e3 * mass_kg.sigma:.0f}"
-    return [("Mass", told, "g", "as weighed; two standard deviations")]
+    how = "as weighed" if measured.hung_free else "as it stood on an edge"
+    return [("Mass", told, "g", f"{how}; two standard deviations")]
 
 
 def _tile(name: str, value: str, unit: str, under: str) -> Markup:

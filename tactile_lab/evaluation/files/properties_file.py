@@ -69,6 +69,7 @@ class MeasuredBody:
         table_friction: coefficient of friction of the table.
         centre_sigma_m: standard deviation of the centre along each axis.
         inertia: about the centre of mass, object frame.
+        hung_free: whether nothing but the fingertips held it when it was weighed; else it stood on an edge.
     """
 
     mass_kg: Value | None = None
@@ -76,6 +77,7 @@ class MeasuredBody:
     table_friction: Value | None = None
     centre_sigma_m: float = 0.0
     inertia: PrincipalInertia | None = None
+    hung_free: bool = True
 
 
 def read_measured(results: Path) -> MeasuredBody:
@@ -86,7 +88,11 @@ def read_measured(results: Path) -> MeasuredBody:
     hint = "Replay the session into a new folder: tactile-lab session replay"
     record = read_json_object(file, hint=hint)
     try:
-        found = MeasuredBody(mass_kg=_value(record.get("mass_kg")), table_friction=_value(record.get("table_friction")))
+        found = MeasuredBody(
+            mass_kg=_value(record.get("mass_kg")),
+            table_friction=_value(record.get("table_friction")),
+            hung_free=record.get("times_weighed_free") != 0,
+        )
         if centre := record.get("centre_of_mass_m"):
             place_m = np.array(centre["value"], dtype=float).reshape(2)
             found = replace(found, centre_m=place_m, centre_sigma_m=float(centre["sigma"][0]))

@@ -17,7 +17,8 @@ from gtsam import Pose3
 
 from drivers.core.errors import SessionError
 from sessions.perception.weighing.object_properties import ObjectProperties
-from sessions.perception.weighing.weighing import Hanging
+from sessions.perception.weighing.table_pull import TablePull
+from sessions.perception.weighing.weighing import Dragging, Hanging
 from sessions.recording.running_session import create_session
 from sessions.recording.session import Session
 from sessions.recording.traffic.reader import may_hold
@@ -165,8 +166,19 @@ def test_what_a_weighed_object_holds_is_told(tmp_path: Path) -> None:
     shape = result_of(3).mesh
     write_properties(folder / "results", ObjectProperties(hangings=[(0, weighed)]), [Pose3()], shape)
     words = Page(report.write(folder).read_text(encoding="utf-8")).texts
+    assert "as weighed; two standard deviations" in words
     assert "Centre of mass, as weighed: x 2.0, y 1.0 ± 2.0 mm (two σ)." in words
     assert {"Mass inside the object", "moment of inertia, kg cm²", "direction x, y, z"} <= set(words)
+
+
+def test_what_stood_on_an_edge_while_it_was_weighed_is_said_to(tmp_path: Path) -> None:
+    folder = make_session(tmp_path, 3)
+    tipped = Hanging(2.5, 0.05, np.zeros(2), np.full(2, 0.001), held_back_N=0.2, pull=TablePull(0.2, 2.5))
+    dragged = Dragging(1.0, 0.1, 0.0, TablePull(1.0, 0.0))
+    write_properties(folder / "results", ObjectProperties([(0, tipped)], [(0, dragged)]), [Pose3()])
+    words = Page(report.write(folder).read_text(encoding="utf-8")).texts
+    assert "as it stood on an edge; two standard deviations" in words
+    assert not any(each.startswith("Centre of mass") for each in words)
 
 
 def test_nested_settings_have_dotted_names(text: str) -> None:
