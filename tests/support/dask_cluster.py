@@ -43,7 +43,10 @@ class DaskCluster:
     @property
     def address(self) -> str:
         """Of the scheduler; "" until it is known."""
-        return str(json.loads(self._file.read_text())["address"]) if self._file.is_file() else ""
+        try:
+            return str(json.loads(self._file.read_text())["address"])
+        except (FileNotFoundError, json.JSONDecodeError):  # not there yet, or being written
+            return ""
 
     def end_scheduler(self) -> None:
         """End the scheduler at once; workers go on looking for it."""
