@@ -17,7 +17,6 @@ from io import BytesIO
 from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
-from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.records import Attachment, Header, Message, Metadata
@@ -199,6 +198,6 @@ def _names_one(path: Path, topics: Collection[str]) -> bool:
     try:
         with open_plain(path) as file:
             summary = make_reader(file).get_summary()
-    except (OSError, McapError, ValueError):
+    except (OSError, *UNREADABLE):
         return True  # whoever reads it will find out
     return summary is None or any(channel.topic in topics for channel in summary.channels.values())
