@@ -12,7 +12,6 @@ POSTURE_rad = np.where([name.endswith("J3") for name in JOINTS], 0.9, 0.2)
 CENTRE_m, HEIGHT_m = np.array([0.4, -0.02]), 0.05
 """Where the weight hangs at first."""
 
-
 JOINT_SIGMA_rad = float(np.radians(0.6))
 
 
@@ -21,14 +20,14 @@ class PlainTip:
 
     drift = np.array([0.01, 0.01, 0.01, 5e-5, 5e-5, 5e-5])
 
+    def __init__(self):
+        self.wrench = np.zeros(6)
+
     def reading(self):
         return self.wrench
 
     def wrenches(self, readings, world_R_distal):
         return readings
-
-    def __init__(self):
-        self.wrench = np.zeros(6)
 
 
 TIPS = {finger: PlainTip() for finger in FINGERS}

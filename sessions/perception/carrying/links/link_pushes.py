@@ -66,11 +66,11 @@ class LinkPushes:
         return self._pushed_s(samples, self._closings)
 
     def opened_s(self, samples: CarrySamples) -> float:
-        """How long links of fingers that have let go pushed in this opening, until the hand rises; the fingers' times
-        added.
+        """How long links of fingers that have let go pushed in this opening, the fingers' times added.
+
+        The samples end where the hand rises: :func:`until_it_rises`.
         """
-        opening = until_it_rises(samples)
-        return 0.0 if opening is None else self._pushed_s(opening, self._openings)
+        return self._pushed_s(samples, self._openings)
 
     def _pushed_s(self, samples: CarrySamples, before: deque[Closing]) -> float:
         if samples.motor_counts is None or np.isnan(samples.motor_counts).any():

@@ -14,7 +14,7 @@ from drivers.shadow.model.motors import MotorMap
 from drivers.simulation.calibration import SimulatedCalibration
 from sessions.perception.carrying.carry_record import CarryRecord, CarrySamples
 from sessions.perception.carrying.held_object import HeldObject
-from sessions.perception.carrying.links.link_pushes import LinkPushes
+from sessions.perception.carrying.links.link_pushes import LinkPushes, until_it_rises
 from sessions.perception.instruments import motor_torques
 from sessions.perception.touch_capture import Measured
 from tactile_lab.rigs.description import load_rig
@@ -207,9 +207,15 @@ def test_what_motors_show_on_the_way_up_again_is_no_landing() -> None:
 
 def test_a_link_that_pushes_while_the_hand_opens_is_heard_until_it_rises() -> None:
     chance, links = np.random.default_rng(15), LinkPushes(MOTORS, TIPS, "right")
-    assert [links.opened_s(opening(chance)) for _ in range(2)] == [0.0, 0.0]
-    assert links.opened_s(pushing(opening(chance), "RFJ3", -40.0, slice(60, 100))) == pytest.approx(0.4, abs=0.06)
-    assert links.opened_s(pushing(opening(chance), "RFJ3", -40.0, slice(160, 200))) == 0.0
+
+    def opened_s(samples: CarrySamples) -> float:
+        cut = until_it_rises(samples)
+        assert cut is not None
+        return links.opened_s(cut)
+
+    assert [opened_s(opening(chance)) for _ in range(2)] == [0.0, 0.0]
+    assert opened_s(pushing(opening(chance), "RFJ3", -40.0, slice(60, 100))) == pytest.approx(0.4, abs=0.06)
+    assert opened_s(pushing(opening(chance), "RFJ3", -40.0, slice(160, 200))) == 0.0
     assert links.closed_s(closing(chance)) == 0.0
 
 

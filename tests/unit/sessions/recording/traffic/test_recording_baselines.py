@@ -131,6 +131,13 @@ def test_a_recording_with_wrong_bytes(whole: bytes, tmp_path: Path) -> None:
     assert_baseline("sessions/recording/damaged", told)
 
 
+def test_wherever_a_recording_was_cut_it_may_hold_anything(whole: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "traffic.mcap"
+    for length in (*range(8), *range(len(whole) - 300, len(whole) - 1)):  # inside numbers of records, too
+        path.write_bytes(whole[:length])
+        assert may_hold(path, {"/events"})
+
+
 def test_a_recording_in_several_files(tmp_path: Path) -> None:
     """All there, the second missing, in the wrong place, or none but the first whole."""
     path = tmp_path / "traffic.mcap"
