@@ -303,7 +303,8 @@ class Conductor:
             planned=self._settings.grasps,
             closing=plan.closing,
             reason=plan.reason,
-            forces_N={contact.finger: contact.force_N for contact in grasp.contacts if not contact.probed},
+            forces_N=_largest_forces_N(grasp, probed=False),
+            touches_N=_largest_forces_N(grasp, probed=True),
             missing=missing,
             landings=len(self._cycle.landings_world_m),
             position_sigma_m=None if covariance is None else float(np.sqrt(np.trace(covariance[:2, :2]) / 2)),
@@ -319,3 +320,12 @@ class Conductor:
     def _tell(self, level: Level, message: str) -> None:
         self._runtime.log(level, "conductor", message)
         self._progress.on_message(message)
+
+
+def _largest_forces_N(grasp: Grasp, *, probed: bool) -> dict[str, float]:
+    """The largest force on each finger that touched, in its touches before the hand closed or in the grasp itself."""
+    largest_N: dict[str, float] = {}
+    for contact in grasp.contacts:
+        if contact.probed is probed:
+            largest_N[contact.finger] = max(contact.force_N, largest_N.get(contact.finger, 0.0))
+    return largest_N

@@ -16,7 +16,8 @@ class GraspReport:
         planned: number of grasps requested.
         closing: how the hand closed.
         reason: why this grasp was chosen.
-        forces_N: contact force of each finger with a contact.
+        forces_N: contact force of each finger that held the object.
+        touches_N: largest force of each finger's taps and touches before.
         missing: fingers without a contact, and why.
         landings: number of landings on the object during the approach.
         position_sigma_m: uncertainty of the object's position in the table plane, None if there is no estimate.
@@ -31,6 +32,7 @@ class GraspReport:
     closing: str
     reason: str
     forces_N: Mapping[str, float]
+    touches_N: Mapping[str, float]
     missing: Mapping[str, str]
     landings: int
     position_sigma_m: float | None

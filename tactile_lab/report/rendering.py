@@ -16,6 +16,8 @@ from drivers.core.contacts import Array
 SUPERSAMPLING = 2
 _LIGHT = np.array([-0.35, 0.55, 0.76])
 _AMBIENT = 0.45
+_STRIPES_px, _STRIPE_px, _IN_STRIPES = 10, 4, 0.68
+"""Period and width of the stripes over what is a guess, and how much of the light is left in them."""
 _PNG_UP, _PNG_RGBA = 2, 6
 
 
@@ -42,12 +44,17 @@ VIEWS = (
 
 
 def render(
-    vertices_m: Array, faces: NDArray[np.int64], vertex_rgb: NDArray[np.uint8], view: View, size_px: int
+    vertices_m: Array,
+    faces: NDArray[np.int64],
+    vertex_rgb: NDArray[np.uint8],
+    vertex_is_guess: NDArray[np.bool_],
+    view: View,
+    size_px: int,
 ) -> NDArray[np.uint8]:
     """A picture of shape (size, size, 4), red green blue alpha, transparent outside the mesh.
 
     Faces are painted from the far to the near ones (orthographic view), each with its mean colour under one
-    soft light; the picture is drawn larger and averaged down.
+    soft light; the picture is drawn larger and averaged down. Guesses are striped, so that grey paper shows them.
     """
     canvas = size_px * SUPERSAMPLING
     seen = (vertices_m - _centre(vertices_m)) @ view.camera_R_object().T
@@ -60,17 +67,24 @@ def render(
     order = front[np.argsort(corners[front, :, 2].mean(axis=1), kind="stable")]
     shade = _AMBIENT + (1 - _AMBIENT) * np.clip(normals[order] @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
     colours = vertex_rgb[faces[order]].astype(float).mean(axis=1) * shade[:, None]
-    return _paint(pixels[faces[order]], colours, canvas, size_px)
+    is_striped = vertex_is_guess[faces[order]].any(axis=1)
+    return _paint(pixels[faces[order]], colours, is_striped, canvas, size_px)
 
 
-def _paint(triangles_px: Array, colours: Array, canvas: int, size_px: int) -> NDArray[np.uint8]:
+def _paint(
+    triangles_px: Array, colours: Array, is_striped: NDArray[np.bool_], canvas: int, size_px: int
+) -> NDArray[np.uint8]:
     """Triangles of shape (n, 3, 2) in colours of shape (n, 3), each over those before it."""
     picture = np.zeros((canvas * canvas, 4), np.uint8)
     triangle, row, left, count = _spans(triangles_px, canvas)
     run_start = row * canvas + left - (np.cumsum(count) - count)
     pixels = np.repeat(run_start, count) + np.arange(count.sum())
     opaque = np.column_stack([np.rint(colours), np.full(len(colours), 255.0)]).astype(np.uint8)
-    picture[pixels] = np.repeat(opaque[triangle], count, axis=0)
+    painted = np.repeat(opaque[triangle], count, axis=0)
+    across = (pixels // canvas + pixels % canvas) % (SUPERSAMPLING * _STRIPES_px)
+    in_stripe = np.repeat(is_striped[triangle], count) & (across < SUPERSAMPLING * _STRIPE_px)
+    painted[in_stripe, :3] = (_IN_STRIPES * painted[in_stripe, :3]).astype(np.uint8)
+    picture[pixels] = painted
     return _shrink(picture.reshape(canvas, canvas, 4), size_px)
 
 
@@ -135,6 +149,12 @@ def _centre(vertices_m: Array) -> Array:
     return np.asarray((vertices_m.min(axis=0) + vertices_m.max(axis=0)) / 2)
 
 
-def views(vertices_m: Array, faces: NDArray[np.int64], vertex_rgb: NDArray[np.uint8], size_px: int) -> Sequence[str]:
+def views(
+    vertices_m: Array,
+    faces: NDArray[np.int64],
+    vertex_rgb: NDArray[np.uint8],
+    vertex_is_guess: NDArray[np.bool_],
+    size_px: int,
+) -> Sequence[str]:
     """The pictures of all :data:`VIEWS` as ``data:`` URLs."""
-    return [png_data_uri(render(vertices_m, faces, vertex_rgb, view, size_px)) for view in VIEWS]
+    return [png_data_uri(render(vertices_m, faces, vertex_rgb, vertex_is_guess, view, size_px)) for view in VIEWS]

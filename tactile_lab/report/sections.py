@@ -170,7 +170,7 @@ def _scale(sigma_m: np.ndarray[Any, Any]) -> Markup:
 def _surface_card(content: ReportContent, surface: Surface) -> Markup:
     high_mm = figures.sigma_scale_mm(surface.sigma_m)
     data = viewer_data(content, surface, high_mm).replace("</", "<\\/")
-    stills = views(surface.vertices_m, surface.faces, surface_colours(surface, high_mm), 360)
+    stills = views(surface.vertices_m, surface.faces, surface_colours(surface, high_mm), np.isnan(surface.sigma_m), 360)
     return element(
         "figure",
         element("h3", "Surface coloured by its uncertainty"),
@@ -191,7 +191,7 @@ def _surface_card(content: ReportContent, surface: Surface) -> Markup:
 
 
 def _grey(surface: Surface) -> str:
-    return "" if np.isfinite(surface.sigma_m).all() else "Grey is a guess: nothing was touched near it. "
+    return "" if np.isfinite(surface.sigma_m).all() else "Striped grey is a guess: nothing was touched near it. "
 
 
 def _still(address: str, name: str) -> Markup:

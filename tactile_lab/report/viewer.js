@@ -23,7 +23,7 @@
   const FRAGMENT = `#version 300 es
     precision highp float;
     in vec3 seen, seenNormal, tint;
-    uniform int kind; uniform vec4 paint;
+    uniform int kind; uniform vec4 paint; uniform float size;
     out vec4 pixel;
     void main() {
       if (kind == 2) {                                   // contacts: round dots with a rim
@@ -37,7 +37,9 @@
       vec3 n = dot(seenNormal, seenNormal) > 0.1 ? normalize(seenNormal) : flatNormal;
       if (n.z < 0.0) n = -n;
       float light = 0.42 + 0.5 * max(dot(n, normalize(vec3(-0.35, 0.55, 0.76))), 0.0) + 0.12 * n.z;
-      pixel = vec4(tint * light, 1.0);
+      float colourful = max(tint.r, max(tint.g, tint.b)) - min(tint.r, min(tint.g, tint.b));
+      bool striped = colourful < 0.15 && mod(gl_FragCoord.x + gl_FragCoord.y, size) < 0.35 * size;
+      pixel = vec4(tint * light * (striped ? 0.68 : 1.0), 1.0);   // a guess is grey: stripes tell it on grey paper
     }`;
 
   const program = gl.createProgram();

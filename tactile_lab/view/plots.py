@@ -32,7 +32,7 @@ class Plots:
         with server.gui.add_folder("Forces over time", expand_by_default=False):
             self._forces = _plot(server, FINGERS, "s before now", "force, N")
         with server.gui.add_folder("Uncertainty over the grasps", expand_by_default=False):
-            self._uncertainty = _plot(server, _SIGMAS, "grasp", "standard deviation")
+            self._uncertainty = _plot(server, _SIGMAS, "grasp", "one sigma")
         self._camera = server.gui.add_folder("Camera", expand_by_default=False, visible=False)
         self._picture: Any = None
 

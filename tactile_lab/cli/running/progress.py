@@ -14,10 +14,10 @@ from sessions.conductor.progress import GraspReport
 from tactile_lab.cli.console import people, say
 
 HEAD = ("grasp", "closing", *FINGERS, "±mm", "±deg", "known", "verdict")
-WIDTHS = (6, -8, *([5] * len(FINGERS)), 6, 6, 7, -1)
+WIDTHS = (6, -8, *([6] * len(FINGERS)), 6, 6, 7, -1)
 """Column widths in characters; negative for left-aligned text."""
 INTERRUPTED = "Ctrl+C: finishing this grasp, then closing the session. Press again to stop immediately"
-LEGEND = "fingertip forces in N, uncertainty of the pose, share of the surface known"
+LEGEND = "fingertip forces in N (in brackets of a touch alone), uncertainty of the pose, share of the surface known"
 
 
 class LiveProgress:
@@ -98,12 +98,18 @@ def _line(cells: tuple[str, ...], style: str = "") -> None:
 
 
 def _cells(report: GraspReport) -> tuple[str, ...]:
-    forces = [f"{report.forces_N[finger]:.2f}" if finger in report.forces_N else "·" for finger in FINGERS]
+    forces = [_force(report, finger) for finger in FINGERS]
     position_mm = None if report.position_sigma_m is None else 1e3 * report.position_sigma_m
     yaw_deg = None if report.yaw_sigma_rad is None else math.degrees(report.yaw_sigma_rad)
     explored = "" if report.explored is None else f"{report.explored:.0%}"
     number = f"{report.number}/{report.planned}"
     return (number, report.closing, *forces, _number(position_mm), _number(yaw_deg), explored, report.verdict)
+
+
+def _force(report: GraspReport, finger: str) -> str:
+    if finger in report.forces_N:
+        return f"{report.forces_N[finger]:.2f}"
+    return f"({report.touches_N[finger]:.1f})" if finger in report.touches_N else "·"
 
 
 def _number(value: float | None) -> str:

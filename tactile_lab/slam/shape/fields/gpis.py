@@ -26,7 +26,7 @@ from tactile_lab.slam.shape.fields.kernels import (
     log_parameter_traces,
 )
 from tactile_lab.slam.shape.fields.leave_one_out import inflation, negative_log_densities
-from tactile_lab.slam.shape.fields.observations import Observations, check_contacts
+from tactile_lab.slam.shape.fields.observations import POINTS_A_CONTACT, Observations, check_contacts
 from tactile_lab.slam.shape.fields.posterior import PosteriorMean, Prediction
 from tactile_lab.slam.shape.fields.priors import PriorMean
 from tactile_lab.slam.shape.fields.row_factor import RowFactor
@@ -213,13 +213,12 @@ class Gpis:
         return 0.5 * np.append(by_kernel, by_noise)
 
     def log_density_given_others(self, asked: NDArray[np.intp]) -> float:
-        """Logarithm of the joint density of some contacts, value and normal, given all others; normals are observed.
+        """Logarithm of the joint density of some contacts, value and normal, given all others.
 
         Args:
             asked: indices of the contacts, shape (a,).
         """
-        each = np.arange(self.contacts_m.shape[1] + 1)
-        together = (asked[:, None] + len(self.contacts_m) * each).reshape(1, -1)
+        together = self._rows_of(asked).reshape(1, -1)
         cost = negative_log_densities(self._factor, self._weights, together)[0]
         return float(-cost - 0.5 * together.size * np.log(2 * np.pi))
 
@@ -230,11 +229,14 @@ class Gpis:
         from leaving a contact out.
 
         Args:
-            asked: indices of the contacts, shape (a,); costs are in the same order. Normals must be observed.
+            asked: indices of the contacts, shape (a,); costs are in the same order.
         """
-        each = np.arange(self.contacts_m.shape[1] + 1)
-        groups = asked[:, None] + len(self.contacts_m) * each
-        return negative_log_densities(self._factor, self._weights, groups)
+        return negative_log_densities(self._factor, self._weights, self._rows_of(asked))
+
+    def _rows_of(self, asked: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Rows of each of some contacts, shape (a, e): its value and normal, or the thesis's points on and off it."""
+        count = 1 + self.contacts_m.shape[1] if self._gradient_count else POINTS_A_CONTACT
+        return asked[:, None] + len(self.contacts_m) * np.arange(count)
 
     @cached_property
     def sigma_inflation(self) -> float:

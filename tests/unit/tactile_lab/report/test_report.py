@@ -344,9 +344,21 @@ def test_still_picture_shows_the_near_side_on_a_clear_background() -> None:
     box = trimesh.creation.box(SIZE_m)
     above = (box.vertices[:, 2] > 0)[:, None]
     colours = np.where(above, [255, 0, 0], [0, 0, 255]).astype(np.uint8)
-    picture = render(np.asarray(box.vertices), np.asarray(box.faces), colours, VIEWS[2], 60)
+    known = np.zeros(len(box.vertices), dtype=bool)
+    picture = render(np.asarray(box.vertices), np.asarray(box.faces), colours, known, VIEWS[2], 60)
     assert picture.shape == (60, 60, 4)
     assert picture[30, 30, 3] == 255
     assert picture[30, 30, 0] > 200
     assert picture[30, 30, 2] == 0
     assert picture[0, 0, 3] == 0
+    assert picture[20:40, 20:40, 0].min() > 200
+
+
+def test_a_guess_is_striped_in_the_still_picture() -> None:
+    box = trimesh.creation.box(SIZE_m)
+    grey = np.full((len(box.vertices), 3), UNKNOWN, dtype=np.uint8)
+    guess = np.ones(len(box.vertices), dtype=bool)
+    picture = render(np.asarray(box.vertices), np.asarray(box.faces), grey, guess, VIEWS[2], 60)
+    middle = picture[20:40, 20:40, 0].astype(int)
+    assert middle.max() - middle.min() > 0.25 * UNKNOWN[0]
+    assert 0.3 < np.mean(middle < 0.85 * middle.max()) < 0.6

@@ -55,3 +55,22 @@ def test_likelihood_gradients_hold_for_any_distance_of_the_labelled_points(kerne
     for index, shift in enumerate(1e-4 * np.eye(len(here))):
         ahead, behind = (field.with_log_parameters(here + s * shift).log_marginal_likelihood() for s in (1, -1))
         assert found[index] == pytest.approx((ahead - behind) / 2e-4, rel=1e-4, abs=1e-3)
+
+
+def test_a_contact_left_out_takes_its_points_off_the_surface_with_it() -> None:
+    points, normals = noisy(*contacts_on_sphere(0.035, 12, 2, seed=2), seed=2)
+    field = Gpis.fit(points, normals, POINT_SIGMA_m, 0.1, thesis("squared_exponential"))
+    costs = field.leave_one_out_costs(np.arange(12))
+    for index in range(12):
+        others = np.delete(np.arange(12), index)
+        without = field.refit(points[others], normals[others], np.full(11, POINT_SIGMA_m), np.full(11, 0.1))
+        density = field.log_marginal_likelihood() - without.log_marginal_likelihood()
+        assert costs[index] == pytest.approx(-density - 1.5 * np.log(2 * np.pi), abs=1e-6)
+
+
+@pytest.mark.parametrize("kernel", KERNELS)
+def test_the_contact_that_the_others_do_not_explain_costs_most(kernel: str) -> None:
+    points, normals = noisy(*contacts_on_sphere(0.035, 40, 3, seed=3), seed=3)
+    points[7] += 0.015 * normals[7]
+    costs = Gpis.fit(points, normals, POINT_SIGMA_m, 0.1, thesis(kernel)).leave_one_out_costs(np.arange(40))
+    assert costs.argmax() == 7

@@ -32,6 +32,7 @@ def run(data: SimulatedGrasps, method: str, known=None, **changes: object) -> Sl
 
 
 DATA = simulate("rectangle", 3, count=8)
+LITTLE_MOTION = {"translation_m": 0.001, "rotation_rad": 0.02}
 
 
 def test_known_poses_place_every_grasp_where_the_object_was() -> None:
@@ -46,6 +47,15 @@ def test_known_poses_place_a_solid_too() -> None:
     data = spatial_data.simulate("box-12x6x6", 1, count=6)
     result = run(data, "known-pose", data.world_T_body, dimension=3, mesh_resolution_m=0.006)
     assert registration_mm(data, result) < 1e-6
+
+
+@pytest.mark.parametrize("method", ["thesis-pf", "thesis-pf-graph"])
+def test_the_filter_of_the_thesis_ends_a_session_in_space_with_doubts_of_its_own(method: str) -> None:
+    """Eight grasps are enough to ask whether the object was exchanged, which compares contacts with the field."""
+    data = spatial_data.simulate("box-12x6x6", 1, count=8, motion_scale=0.0)
+    result = run(data, method, dimension=3, mesh_resolution_m=0.006, particles=200, motion=LITTLE_MOTION)
+    assert registration_mm(data, result) < 5.0
+    assert result.mesh is not None
 
 
 @pytest.mark.long
