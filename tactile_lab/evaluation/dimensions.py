@@ -44,7 +44,8 @@ def dimensions(estimate: EstimateWithTruth) -> tuple[Extent, ...] | None:
         return None
     truth_m = _true_points(estimate)
     true_mm = [None] * len(SIDES) if truth_m is None else [1e3 * size.whole.length_m for size in sizes(truth_m)]
-    return tuple(_extent(name, size, true) for name, size, true in zip(SIDES, sizes(*found), true_mm, strict=False))
+    stated = sizes(*found, estimate.placed_contacts_m)
+    return tuple(_extent(name, size, true) for name, size, true in zip(SIDES, stated, true_mm, strict=False))
 
 
 def _extent(name: str, size: Size, true_mm: float | None) -> Extent:

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import trimesh
 from gtsam import Pose3
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from drivers.core.poses import transform_points
 from tactile_lab.evaluation.files.mesh_io import read_mesh
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.evaluation.files.tables import read_contour
@@ -87,6 +89,16 @@ class EstimateWithTruth:
             return modulo_mesh_symmetry(self.poses, self.truth.world_T_object, self.truth.mesh, self.symmetry_turns)
         centre_m = ORIGIN_m if self.symmetry is None else self.symmetry.centre_m
         return modulo_symmetry(self.poses, self.truth.world_T_object, self.symmetry_turns, centre_m)
+
+    @property
+    def placed_contacts_m(self) -> Array:
+        """Contacts of all placed grasps in the estimate's object frame, shape (m, d)."""
+        placed = [
+            transform_points(pose.inverse(), rows.points_world_m)
+            for pose, rows in zip(self.poses, self.results.contacts, strict=True)
+            if pose is not None
+        ]
+        return np.vstack([np.empty((0, 3)), *placed])[:, : self.results.dimension]
 
     @cached_property
     def registration_rms_mm(self) -> float | None:

@@ -100,7 +100,7 @@ def assess(
         *doubts_of(others),
         *_refused(refused),
         *_few(len(refused) - sum(refused)),
-        *unknown_sizes(shape),
+        *unknown_sizes(shape, contact_map.contacts.points_m),
         *missing,
         *many_heights(heights_m),
         *(

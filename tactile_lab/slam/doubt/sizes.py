@@ -44,7 +44,7 @@ class Size:
 
     Attributes:
         whole: of all of it. An end that was touched anywhere is as certain as there, whatever its rim is.
-        touched: between the outermost places that were touched; None if nothing was.
+        touched: between the outermost places of the shape that were touched; None if nothing was.
         is_guess: whether an end was touched nowhere.
     """
 
@@ -53,12 +53,17 @@ class Size:
     is_guess: bool
 
 
-def unknown_sizes(shape: Contour | SurfaceMesh | None) -> list[Doubt]:
-    """A doubt where an end of the shape is a guess: most of a surface may be known, and yet not how long it is."""
+def unknown_sizes(shape: Contour | SurfaceMesh | None, contacts_m: Array) -> list[Doubt]:
+    """A doubt where an end of the shape is a guess: most of a surface may be known, and yet not how long it is.
+
+    Args:
+        shape: object frame, with its known part.
+        contacts_m: those that the estimate uses, object frame, shape (n, d).
+    """
     if shape is None:
         return []
     points_m = shape.points_m if isinstance(shape, Contour) else shape.vertices
-    found = zip(SIDES, sizes(points_m, shape.sigma_m, shape.known), strict=False)
+    found = zip(SIDES, sizes(points_m, shape.sigma_m, shape.known, contacts_m), strict=False)
     unknown = [_in_words(name, size) for name, size in found if size.whole.sigma_m > LARGEST_SIGMA_m]
     if not unknown:
         return []
@@ -72,19 +77,27 @@ def _in_words(name: str, size: Size) -> str:
     return f"{told} (touched over {1e3 * size.touched.length_m:.0f} mm)"
 
 
-def sizes(points_m: Array, sigma_m: Array | None = None, known: NDArray[np.bool_] | None = None) -> Sequence[Size]:
+def sizes(
+    points_m: Array,
+    sigma_m: Array | None = None,
+    known: NDArray[np.bool_] | None = None,
+    contacts_m: Array | None = None,
+) -> Sequence[Size]:
     """Length, width and, of points in space, height.
 
     Args:
         points_m: of an outline, shape (n, 2), or a surface, shape (n, 3).
         sigma_m: their standard deviations, shape (n,); none by default.
-        known: which of them were touched, shape (n,); all by default.
+        known: which of them the contacts tell of, shape (n,); all by default.
+        contacts_m: in the same frame, shape (m, d): nothing beyond them was touched, however far they tell of a
+            straight side; by default all that is known was touched.
     """
     sigma_m = np.zeros(len(points_m)) if sigma_m is None else sigma_m
     known = np.ones(len(points_m), dtype=bool) if known is None else known
-    along, across = _rectangle(points_m[:, :2])
-    places = [points_m[:, :2] @ along, points_m[:, :2] @ across, *points_m[:, 2:].T]
-    return [_size(place, sigma_m, known) for place in places]
+    directions = np.eye(points_m.shape[1])
+    directions[:2, :2] = _rectangle(points_m[:, :2])
+    met_m = points_m[known] if contacts_m is None else contacts_m
+    return [_size(points_m @ each, sigma_m, known, met_m @ each) for each in directions]
 
 
 def _rectangle(points_m: Array) -> tuple[Array, Array]:
@@ -102,12 +115,21 @@ def _rectangle(points_m: Array) -> tuple[Array, Array]:
     return (along[best], across[best]) if longer_first else (across[best], along[best])
 
 
-def _size(places_m: Array, sigma_m: Array, known: NDArray[np.bool_]) -> Size:
+def _size(places_m: Array, sigma_m: Array, known: NDArray[np.bool_], met_m: Array) -> Size:
     jaws = _jaws(places_m)
     felt = [jaw & known for jaw in jaws]
     ends = [touched if touched.any() else jaw for touched, jaw in zip(felt, jaws, strict=True)]
-    touched = _span(places_m[known], sigma_m[known], _jaws(places_m[known])) if known.any() else None
-    return Size(_span(places_m, sigma_m, ends), touched, not all(jaw.any() for jaw in felt))
+    return Size(
+        _span(places_m, sigma_m, ends), _touched(places_m, sigma_m, known, met_m), not all(jaw.any() for jaw in felt)
+    )
+
+
+def _touched(places_m: Array, sigma_m: Array, known: NDArray[np.bool_], met_m: Array) -> Span | None:
+    """Between the outermost places that are known and lie between contacts."""
+    if not len(met_m):
+        return None
+    between = known & (places_m >= met_m.min() - _JAW_m) & (places_m <= met_m.max() + _JAW_m)
+    return _span(places_m[between], sigma_m[between], _jaws(places_m[between])) if between.any() else None
 
 
 def _jaws(places_m: Array) -> list[NDArray[np.bool_]]:

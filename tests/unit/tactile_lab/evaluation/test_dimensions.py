@@ -12,7 +12,7 @@ from drivers.core.contacts import Array
 from tactile_lab.evaluation.dimensions import dimensions
 from tactile_lab.evaluation.estimate_with_truth import EstimateWithTruth, Truth
 from tactile_lab.evaluation.files.results import Results
-from tactile_lab.evaluation.files.tables import contour_text
+from tactile_lab.evaluation.files.tables import ContactRows, contour_text
 from tactile_lab.evaluation.files.trajectory_file import Trajectory
 
 TURN = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
@@ -23,7 +23,10 @@ def estimated(
     folder: Path, ring_m: Array, sigma_m: Array, truth_m: Array | None, known: Array | None = None
 ) -> EstimateWithTruth:
     (folder / "contour.csv").write_text(contour_text(ring_m, sigma_m, known))
-    results = Results(Trajectory((0.0,), (Pose3(),)), (), {"dimension": 2}, ())
+    corners_m = np.column_stack([ring_m, np.zeros(len(ring_m))])
+    each = np.full(len(ring_m), 0.001)
+    rows = ContactRows(("FF",) * len(ring_m), corners_m, np.tile([1.0, 0.0, 0.0], (len(ring_m), 1)), each, each, each)
+    results = Results(Trajectory((0.0,), (Pose3(),)), (rows,), {"dimension": 2}, ())
     return EstimateWithTruth(folder, results, Truth((Pose3(),), outline_m=truth_m))
 
 

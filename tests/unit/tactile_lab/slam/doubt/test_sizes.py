@@ -49,9 +49,9 @@ def test_of_what_nobody_touched_nothing_is_known() -> None:
 
 
 def test_a_shape_whose_end_is_a_guess_is_partial_however_much_of_it_is_known() -> None:
-    assert unknown_sizes(outline(0.002)) == []
-    assert unknown_sizes(None) == []
-    (doubt,) = unknown_sizes(outline(0.040))
+    assert unknown_sizes(outline(0.002), CORNERS) == []
+    assert unknown_sizes(None, CORNERS) == []
+    (doubt,) = unknown_sizes(outline(0.040), CORNERS)
     assert "length 100 ± 40 mm" in doubt.words
     assert status_of(lost=False, known_share=0.97, doubts=[doubt]) == "partial"
     assert status_of(lost=False, known_share=0.97, doubts=[]) == "complete"
@@ -60,6 +60,23 @@ def test_a_shape_whose_end_is_a_guess_is_partial_however_much_of_it_is_known() -
 def test_an_end_that_was_touched_at_one_corner_is_no_guess() -> None:
     end, elsewhere = outline(0.040), np.array([True, False, False, True])
     unknown_at_one = replace(end, sigma_m=np.array([0.0005, 0.0005, 0.040, 0.0005]), known=np.array([1, 1, 0, 1], bool))
-    assert unknown_sizes(unknown_at_one) == []
-    (doubt,) = unknown_sizes(replace(end, known=elsewhere))
+    assert unknown_sizes(unknown_at_one, CORNERS) == []
+    (doubt,) = unknown_sizes(replace(end, known=elsewhere), CORNERS)
     assert "length 100 ± 40 mm" in doubt.words
+
+
+def test_nothing_beyond_the_contacts_was_touched_however_far_a_straight_side_is_known() -> None:
+    """Contacts on the left 50 mm of both long sides; the outline is known 30 mm farther."""
+    places = np.linspace(0.0, 0.10, 51)
+    upper, lower = (np.column_stack([places, np.full(51, y)]) for y in (0.06, 0.0))
+    ring_m, known = np.vstack([lower, upper[::-1]]), np.concatenate([places < 0.081, places[::-1] < 0.081])
+    contacts_m = np.array([[0.0, 0.03], [0.02, 0.0], [0.05, 0.0], [0.01, 0.06], [0.05, 0.06]])
+    sigma_m = np.where(known, 0.0005, 0.040)
+    length, width = sizes(ring_m @ TURN.T, sigma_m, known, contacts_m @ TURN.T)
+    assert length.touched is not None
+    assert width.touched is not None
+    assert (length.whole.length_m, length.touched.length_m) == pytest.approx((0.10, 0.05))
+    assert width.touched.length_m == pytest.approx(0.06)
+    (doubt,) = unknown_sizes(Contour(ring_m @ TURN.T, sigma_m, True, known=known), contacts_m @ TURN.T)
+    assert "(touched over 50 mm)" in doubt.words
+    assert sizes(ring_m, sigma_m, known, np.empty((0, 2)))[0].touched is None
