@@ -62,6 +62,8 @@ def _notes(notes: str, newest: Part) -> str:
 
 Lines: TypeAlias = CurvePanel | RangePanel
 
+_EARLIER_IN_KEY = f"; {EARLIER.strip()}: by an earlier version"
+
 
 def merge_plots(parts: Sequence[Part]) -> Plot | None:
     """The newest part's plot, plus lines that only earlier parts have, marked by an asterisk."""
@@ -81,7 +83,8 @@ def _with_earlier(newer: Plot, older: Plot) -> Plot:
     if not any(line.name.endswith(EARLIER) for panel in panels.values() for line in panel.lines):
         return newer
     usual = CURVES_KEY if isinstance(newer.panels[0], CurvePanel) else RANGES_KEY
-    return replace(newer, panels=tuple(panels.values()), key=f"{newer.key or usual}; *: by an earlier version")
+    key = (newer.key or usual).removesuffix(_EARLIER_IN_KEY)
+    return replace(newer, panels=tuple(panels.values()), key=key + _EARLIER_IN_KEY)
 
 
 def _with_lines(newer: Lines | None, older: Lines) -> Lines:

@@ -27,14 +27,14 @@ from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
 Mask: TypeAlias = NDArray[np.bool_]
 _Shape = TypeVar("_Shape", bound=Contour | SurfaceMesh)
 
-REACH_m = 0.040
-"""A contact tells about an outline up to here, and a guess is no more uncertain than this."""
-
-SURFACE_REACH_m = 0.025
-"""A contact tells about a surface up to here, where the model goes on by symmetry, along planes or between contacts: a
-spout or a handle is hardly wider than the places left between. Forty contacts all over a solid of 60 to 100 mm know
-nine tenths of it.
+REACH_m = 0.025
+"""A contact tells about a shape up to here, where the model goes on by symmetry, along sides or between contacts: a
+spout, a handle or a corner is hardly wider than the places left between. Forty contacts all over a solid of 60 to 100
+mm know nine tenths of it.
 """
+
+LARGEST_GUESS_m = 0.040
+"""No guess is more uncertain than this."""
 
 _CONTRADICTED_m, _DEEP_m = 0.010, 0.005
 """A finger went through so deep inside the model: so far around the nearest place of its surface that is not known."""
@@ -66,7 +66,7 @@ class KnownPart:
         known: whether it is certain besides, shape (n,).
         share: of the outline's length or the surface's area, 0 to 1.
         distances_m: from each point to the nearest contact on a side that faces the same way, at most
-            :data:`REACH_m`, shape (n,).
+            :data:`LARGEST_GUESS_m`, shape (n,).
         unfelt: where a surface has a top in place of which there may be an opening, shape (n,).
     """
 
@@ -94,19 +94,17 @@ def known_part(
             object held free.
         free_m: places that a finger went through, object frame, shape (q, d); a surface that encloses them is not known
             there.
-        reach_m: how far from a contact an outline is known; a surface no further than :data:`SURFACE_REACH_m`.
+        reach_m: how far from a contact the shape is known.
     """
     sides = _outline(shape) if isinstance(shape, Contour) else _surface(shape)
     distances_m, nowhere = _nearest_alike(sides, contacts), np.zeros(len(sides.points_m), dtype=bool)
-    unfelt = foot = nowhere
-    if isinstance(shape, Contour):
-        near = distances_m < reach_m
-    else:
-        near = _lined(shape, distances_m < min(reach_m, SURFACE_REACH_m)) & ~_contradicted(shape, free_m)
+    near, unfelt, foot = distances_m < reach_m, nowhere, nowhere
+    if isinstance(shape, SurfaceMesh):
+        near = _lined(shape, near) & ~_contradicted(shape, free_m)
         if floor_m is not None:
             unfelt = unfelt_top(shape, contacts.points_m, contacts.normals, near)
             foot = (sides.points_m[:, 2] < floor_m + LEVEL_SIGMA_m) & (sides.normals[:, 2] < _DOWN)
-    near, distances_m = near & ~unfelt, np.where(unfelt, REACH_m, distances_m)
+    near, distances_m = near & ~unfelt, np.where(unfelt, LARGEST_GUESS_m, distances_m)
     known, near = (near & (shape.sigma_m <= LARGEST_SIGMA_m)) | foot, near | foot
     share = float(sides.sizes @ known / max(float(sides.sizes.sum()), 1e-12))
     return KnownPart(near, known, min(share, 1.0), distances_m, unfelt)
@@ -193,8 +191,10 @@ def _contradicted(mesh: SurfaceMesh, free_m: Array | None) -> Mask:
 
 
 def _nearest_alike(sides: _Sides, contacts: ContactSet) -> Array:
-    """Distance of each point to the nearest contact on a side that faces the same way, at most :data:`REACH_m`."""
-    nearest, least = np.full(len(sides.points_m), REACH_m), np.cos(LARGEST_ANGLE_rad)
+    """Distance of each point to the nearest contact on a side that faces the same way, at most
+    :data:`LARGEST_GUESS_m`.
+    """
+    nearest, least = np.full(len(sides.points_m), LARGEST_GUESS_m), np.cos(LARGEST_ANGLE_rad)
     for first in range(0, len(contacts), _BLOCK):
         block = slice(first, first + _BLOCK)
         facing = contacts.normals[block].T

@@ -67,7 +67,8 @@ def alternatives(
         shifts = _shifts(best, rows)
         moved = tuple(int(i) for i in np.flatnonzero(shifts > _LEAST_SHIFT_m))
         turned_only = symmetry is not None and symmetry.interchangeable and _all_turns(best, rows, moved, symmetry)
-        if moved and not turned_only and all(moved != known for known, *_ in different):
+        known = any(moved == grasps and _are_alike(best, rows, others) for grasps, others, _ in different)
+        if moved and not turned_only and not known:
             different.append((moved, rows, max(gap, 0.0)))
     weights = np.exp([-_TRUST * gap for *_, gap in different])
     probabilities = weights / (1.0 + weights.sum())
@@ -129,11 +130,16 @@ def doubts_of(found: Sequence[Alternative]) -> tuple[Doubt, ...]:
 
 
 def _in_same_frame(best: ContactMap, other: ContactMap) -> Array:
-    """The other poses, in the object frame in which most grasps agree with the estimate."""
+    """The other poses, in the object frame in which most grasps agree with the estimate, and these best."""
     space = best.space
     offsets = space.compose(space.inverse(best.rows), other.rows)
-    agreeing = [int(np.sum(_lengths(space, space.deviation(offsets, one)) < _SAME_m)) for one in offsets]
-    return space.compose(other.rows, space.inverse(offsets[int(np.argmax(agreeing))]))
+    away_m = [np.minimum(_lengths(space, space.deviation(offsets, one)), _SAME_m).sum() for one in offsets]
+    return space.compose(other.rows, space.inverse(offsets[int(np.argmin(away_m))]))
+
+
+def _are_alike(best: ContactMap, rows: Array, others: Array) -> bool:
+    """Whether two trajectories in the same frame place all contacts alike."""
+    return bool(_shifts(best.with_rows(others), rows).max(initial=0.0) <= _LEAST_SHIFT_m)
 
 
 def _lengths(space: PoseVectors, gaps: Array) -> Array:

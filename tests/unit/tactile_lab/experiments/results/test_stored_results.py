@@ -150,11 +150,11 @@ def test_notes_tell_when_the_figures_are_of_another_version() -> None:
 
 
 def test_lines_that_only_an_earlier_version_drew_have_a_star() -> None:
-    parts = (made(NOW, plot=ranges("joint")), made(OLD, plot=ranges("icp", "joint")))
+    parts = (made(NOW, plot=ranges("joint")), made(OLD, plot=ranges("icp", "joint")), made(OLD, plot=ranges("pf")))
     plot = merge_plots(parts)
     assert plot is not None
-    assert [line.name for line in plot.panels[0].lines] == ["joint", "icp *"]
-    assert "earlier version" in plot.key
+    assert [line.name for line in plot.panels[0].lines] == ["joint", "icp *", "pf *"]
+    assert plot.key.count("*: by an earlier version") == 1
     assert merge_plots(parts[:1]) == ranges("joint")
     assert merge_plots((made(NOW),)) is None
 

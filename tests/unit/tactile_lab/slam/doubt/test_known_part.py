@@ -11,7 +11,7 @@ import trimesh
 from drivers.core.contacts import Array
 from tactile_lab.experiments.data.household import turned
 from tactile_lab.experiments.data.outlines import OUTLINES_m
-from tactile_lab.slam.doubt.known_part import REACH_m, known_part, with_guesses_told
+from tactile_lab.slam.doubt.known_part import LARGEST_GUESS_m, known_part, with_guesses_told
 from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
@@ -60,7 +60,7 @@ def test_a_guess_is_marked_and_has_no_small_sigma() -> None:
     part = known_part(outline(), touched(RIGHT))
     told = with_guesses_told(outline(), part)
     assert told.known is not None
-    assert told.sigma_m[~told.known].min() == REACH_m
+    assert told.sigma_m[~told.known].min() == LARGEST_GUESS_m
     np.testing.assert_array_equal(told.sigma_m[told.known], 0.001)
 
 
@@ -70,7 +70,7 @@ def test_what_is_uncertain_near_contacts_is_no_guess_farther_than_it_says() -> N
     told = with_guesses_told(unsure, part)
     assert not part.known.any()
     np.testing.assert_array_equal(told.sigma_m[part.near], 0.006)
-    assert told.sigma_m[~part.near].min() == REACH_m
+    assert told.sigma_m[~part.near].min() == LARGEST_GUESS_m
 
 
 def test_simulated_grasps_all_around_know_the_whole_outline() -> None:

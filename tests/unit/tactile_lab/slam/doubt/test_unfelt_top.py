@@ -8,7 +8,7 @@ import trimesh
 
 from drivers.core.contacts import Array
 from tactile_lab.experiments.data.household import turned
-from tactile_lab.slam.doubt.known_part import REACH_m, known_part, with_guesses_told
+from tactile_lab.slam.doubt.known_part import LARGEST_GUESS_m, known_part, with_guesses_told
 from tactile_lab.slam.doubt.status import status_of
 from tactile_lab.slam.doubt.unfelt_top import doubts_of_top, unfelt_top
 from tactile_lab.slam.shape.surfaces.surface import Mask, SurfaceMesh
@@ -119,7 +119,7 @@ def test_what_may_be_open_is_a_guess_and_the_estimate_partial(inside: list[tuple
     middle = (np.linalg.norm(mesh.vertices[:, :2], axis=1) < 0.028) & (mesh.vertices[:, 2] > HIGH_m - 0.001)
     assert told.known is not None
     assert told.known[middle].all() == bool(inside)
-    assert told.sigma_m[middle].min() == pytest.approx(0.0005 if inside else REACH_m)
+    assert told.sigma_m[middle].min() == pytest.approx(0.0005 if inside else LARGEST_GUESS_m)
     doubts = doubts_of_top(mesh, part.unfelt)
     assert status_of(lost=False, known_share=0.95, doubts=doubts) == status
     assert ["55 x 55 mm" in doubt.words for doubt in doubts] == [True] * (not inside)

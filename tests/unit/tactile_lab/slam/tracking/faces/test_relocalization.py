@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.core.contacts import Grasp
+from drivers.core.contacts import Array, Grasp
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron
 from tactile_lab.slam.shape.solids.solid_field import SolidField, TabulatedSolid
 from tactile_lab.slam.tracking.contacts.contact_map import ContactMap
@@ -16,6 +16,7 @@ from tactile_lab.slam.tracking.contacts.motion import MotionNoise
 from tactile_lab.slam.tracking.faces.facet_smoothing import FacetSmoother
 from tactile_lab.slam.tracking.faces.faceted_scorer import FacetedScorer
 from tactile_lab.slam.tracking.faces.flat_faces import flat_faces
+from tactile_lab.slam.tracking.faces.other_places import Outlook
 from tactile_lab.slam.tracking.faces.relocalization import Relocalizer
 from tactile_lab.slam.tracking.faces.solid_face_extents import solid_face_extents
 from tactile_lab.slam.tracking.joint.hypotheses import Hypothesis, HypothesisScorer
@@ -24,6 +25,7 @@ from tests.support.simulated_contacts import true_map
 
 NOISE = MotionNoise()
 COUNT = 10
+OUTLINE_OF_ONE = true_map("rectangle", count=1, dimension=2)
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +37,13 @@ def moved(contact_map: ContactMap, index: int, step: list[float]) -> ContactMap:
     rows = contact_map.rows
     rows[index] = contact_map.space.move(rows[index], np.array(step))
     return contact_map.with_rows(rows)
+
+
+def gap_to_others(right: ContactMap, found: ContactMap, grasp: int) -> Array:
+    """How much further than the last but one a grasp is from where it belongs, whichever of them the frame is of."""
+    space = right.space
+    offsets = space.compose(space.inverse(right.rows), found.rows)
+    return space.deviation(offsets[grasp : grasp + 1], offsets[-2])[0]
 
 
 def judge_of(contact_map: ContactMap) -> FacetedScorer:
@@ -105,13 +114,15 @@ def test_a_tabulated_solid_is_like_the_solid(l_block: ContactMap, scale: float) 
     assert np.array_equal(one.variance_m2, other.variance_m2)
 
 
-def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: ContactMap) -> None:
-    wrong = rated(moved(l_block, 9, [0.012, -0.02, np.deg2rad(90.0)]))
+@pytest.mark.parametrize("grasp", [0, 9])
+def test_a_grasp_that_closed_on_the_wrong_faces_is_found_its_place(l_block: ContactMap, grasp: int) -> None:
+    """The first one, too, at which the object frame was born."""
+    wrong = rated(moved(l_block, grasp, [0.012, -0.02, np.deg2rad(90.0)]))
     right = rated(l_block)
     found = Relocalizer(judge_of(l_block), NOISE, ProposalSettings()).improve(wrong)
     assert wrong.cost > right.cost + 5
     assert found.cost < wrong.cost - 5
-    gap = l_block.space.deviation(found.map.rows[9:10], l_block.rows[9])[0]
+    gap = gap_to_others(l_block, found.map, grasp)
     assert np.linalg.norm(gap[:2]) < 0.006
     assert abs(gap[2]) < 0.15
 
@@ -184,16 +195,22 @@ def outline() -> ContactMap:
     return true_map("rectangle", count=COUNT, dimension=2)
 
 
-def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outline: ContactMap) -> None:
+@pytest.mark.parametrize("grasp", [0, 7])
+def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outline: ContactMap, grasp: int) -> None:
     """Driven onto the others' field: two of its contacts are left out where it is, none where it belongs."""
-    elsewhere = moved(outline, 7, [0.02, -0.015, np.deg2rad(60.0)])
-    wrong = judge_of(outline).better(elsewhere.without_contact(7, 0).without_contact(7, 1))
+    elsewhere = moved(outline, grasp, [0.02, -0.015, np.deg2rad(60.0)])
+    wrong = judge_of(outline).better(elsewhere.without_contact(grasp, 0).without_contact(grasp, 1))
     found = Relocalizer(judge_of(outline), NOISE, ProposalSettings()).improve(wrong)
     assert found.cost < wrong.cost - 10
-    gap = outline.space.deviation(found.map.rows[7:8], outline.rows[7])[0]
+    gap = gap_to_others(outline, found.map, grasp)
     assert np.linalg.norm(gap[:2]) < 0.006
     assert abs(gap[2]) < 0.15
-    assert not found.map.placed[7].left_out
+    assert not found.map.placed[grasp].left_out
+
+
+def test_a_grasp_alone_has_no_other_place() -> None:
+    alone = judge_of(OUTLINE_OF_ONE).better(OUTLINE_OF_ONE)
+    assert Relocalizer(judge_of(OUTLINE_OF_ONE), NOISE, ProposalSettings()).improve(alone) is alone
 
 
 def test_grasps_that_fit_an_outline_stay(outline: ContactMap) -> None:
@@ -211,3 +228,40 @@ def test_a_grasp_that_slid_off_the_end_of_a_face_is_found_its_place(outline: Con
     found = Relocalizer(judge, NOISE, ProposalSettings()).improve(slid)
     assert found.cost < slid.cost - 10
     assert judge.strayed(found.map) == frozenset()
+
+
+def test_first_grasps_that_took_a_wrong_turn_together_are_led_back_from_the_next(l_block: ContactMap) -> None:
+    """Each alone would pay for two slips, at either side of it; together they pay for one less."""
+    space, rows = l_block.space, l_block.rows
+    turn = np.array([0.012, -0.02, np.deg2rad(90.0)])
+    rows[:2] = space.compose(rows[:2], np.broadcast_to(turn, (2, 3)))
+    turned = l_block.with_rows(rows)
+    solid = TabulatedSolid(judge_of(l_block).solid(rated(l_block)), 0.0005)
+    onto = dict.fromkeys(range(COUNT), solid)
+    places = Outlook(turned, onto, NOISE, ProposalSettings().model_copy(update={"samples": 48})).all_places()
+    (first, *_) = sorted((place for place in places if len(place.rows) == 2), key=lambda place: place.change)
+    assert first.index == 0
+    assert first.change < -5
+    gaps = space.deviation(first.rows, l_block.rows[:2])
+    assert np.abs(gaps[:, :2]).max() < 0.010
+    assert np.abs(gaps[:, 2]).max() < 0.15
+
+
+def test_a_place_that_comes_close_is_judged_with_other_contacts_left_out(l_block: ContactMap) -> None:
+    """A contact that is right has a face of its own while its grasp is elsewhere, and is left out when it is moved."""
+
+    class Judge(FacetedScorer):
+        asked = 0
+
+        def reconsidered(self, sharp: Hypothesis) -> Hypothesis:
+            self.asked += 1
+            return replace(super().reconsidered(sharp), misfit=sharp.misfit - 9.0)
+
+    judge, right = Judge(HypothesisScorer(NOISE, 2.0), NOISE), rated(l_block)
+    near = replace(right, misfit=right.misfit + 5.0)
+    far = replace(right, misfit=right.misfit + 50.0)
+    relocalizer = Relocalizer(judge, NOISE, ProposalSettings())
+    found = relocalizer._reconsidered([near, far], right)
+    assert judge.asked == 1
+    assert found[0].cost == pytest.approx(right.cost - 4.0)
+    assert found[1] is far
