@@ -40,6 +40,11 @@ from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 _OUTSIDE_m = 0.012
 """Contacts so far outside of a surface, several of them near each other, are no noise."""
 _KERNEL_STEPS = 10
+_LARGEST_SHARE_OFF_HOLLOW = 0.05
+"""Of the contacts, off the surface of a hollow body. With more of them a solid with flat faces or upright walls that
+has them all is believed: what is between the arms of an L is no cavity. A field has every contact, and tells nothing.
+"""
+
 _BEYOND_DOUBT_nats = 3.0
 """A sharp solid that explains each contact this much better than the field is accepted at once. No curved object came
 near this value (2.7 at most), cross-validation takes time, and with contacts held out a face with few contacts may be
@@ -62,7 +67,8 @@ def best_spatial_shape(
     A sharp solid is accepted only if it is consistent with what is known: its contacts lie on its surface, and it does
     not fill places that fingers passed. It must also predict contacts to which it was not fitted better than the field
     does (:mod:`tactile_lab.slam.shape.selection.held_out`). Of a body into which fingers came down inside a rim,
-    the outside is chosen without what they met and where they were there; what they met tells how thick the wall is.
+    the outside is chosen without what they met and where they were there; what they met tells how thick the wall is. It
+    is hollow unless that leaves contacts off which a sharp solid explains.
 
     Args:
         field: the field as a shape, used unless another model is more probable; without a table it keeps all contacts.
@@ -74,14 +80,17 @@ def best_spatial_shape(
     """
     if floor_m is None or field.log_evidence is None:
         return _best_solid(field, gpis, best_outline, free_points_m, floor_m)
+    hollow: FittedShape | None = None
     if free_points_m is not None and (entered := are_entered(gpis, free_points_m)).any():
         inside = felt_inside(gpis, free_points_m[entered])
         outside = gpis.of_some(np.flatnonzero(~inside)).optimise(max_iterations=_KERNEL_STEPS) if inside.any() else gpis
         around = GpisShape(outside), outside, best_outline, free_points_m[~entered], floor_m
         hollow = try_make(lambda: hollowed(_best_solid(*around), gpis, free_points_m, floor_m, inside))
-        if isinstance(hollow, Hollow):
+        if isinstance(hollow, Hollow) and hollow.share_off <= _LARGEST_SHARE_OFF_HOLLOW:
             return hollow
     best = _best_solid(field, gpis, best_outline, free_points_m, floor_m)
+    if isinstance(hollow, Hollow) and not isinstance(best, Polyhedron | Prism):
+        return hollow
     return try_make(lambda: hollowed(best, gpis, free_points_m, floor_m)) or best
 
 

@@ -84,6 +84,11 @@ class Hollow:
         return self.floor_m + max(self.wall_m, _LEAST_FLOOR_m)
 
     @property
+    def share_off(self) -> float:
+        """Of the contacts, that are not on its surface."""
+        return _off(self.field, self.gpis) / len(self.gpis.contacts_m)
+
+    @property
     def log_evidence(self) -> float | None:
         """Of the body: no contact tells of the cavity."""
         return self.body.log_evidence

@@ -235,3 +235,11 @@ def test_a_pot_has_flat_walls_as_thick_as_fingers_inside_found_them_though_its_r
     assert pot.name == "hollow polyhedron"
     assert isinstance(pot, Hollow)
     assert pot.wall_m == pytest.approx(wall_m, abs=0.0007)
+
+
+def test_what_is_between_the_arms_of_an_l_is_no_cavity() -> None:
+    """Its top is all around the notch, seen from above, and fingers came down there to touch the inner sides."""
+    x, y, z = (each.ravel() for each in np.meshgrid([0.015, 0.025, 0.035], [0.02, 0.03, 0.04], [0.02, 0.035]))
+    shape = best_shape(field_on(l_block_mesh(), 70, seed=3), np.column_stack([x, y, z]), floor_m=0.0)
+    assert shape.name in ("polyhedron", "prism")
+    assert mesh_errors(shape.mesh(floor_m=0.0), l_block_mesh()).hausdorff_m < 0.003
