@@ -67,7 +67,7 @@ def render(
     order = front[np.argsort(corners[front, :, 2].mean(axis=1), kind="stable")]
     shade = _AMBIENT + (1 - _AMBIENT) * np.clip(normals[order] @ (_LIGHT / np.linalg.norm(_LIGHT)), 0.0, 1.0)
     colours = vertex_rgb[faces[order]].astype(float).mean(axis=1) * shade[:, None]
-    is_striped = vertex_is_guess[faces[order]].any(axis=1)
+    is_striped = np.asarray(vertex_is_guess[faces[order]].any(axis=1))
     return _paint(pixels[faces[order]], colours, is_striped, canvas, size_px)
 
 

@@ -154,11 +154,11 @@ def forces_html(scene: Scene) -> str:
         colour = "#f0aa1e" if load_N is None else "#2ea043" if load_N > 0.1 else "#969eaa"
         text = "silent" if load_N is None else f"{load_N:.2f} N"
         cells.append(
-            f'<div style="flex:1;min-width:0"><div style="height:6px;background:#e5e8ec;border-radius:3px">'
+            f'<div style="flex:1 0 4.4em"><div style="height:6px;background:#e5e8ec;border-radius:3px">'
             f'<div style="height:6px;width:{100 * share:.0f}%;background:{colour};border-radius:3px"></div></div>'
-            f'<div>{finger} <span style="white-space:nowrap">{text}</span></div></div>'
+            f'<div style="white-space:nowrap">{finger} {text}</div></div>'
         )
-    return f'<div style="display:flex;gap:6px;margin:0.5em 0;font-size:0.85em">{"".join(cells)}</div>'
+    return f'<div style="display:flex;flex-wrap:wrap;gap:6px;margin:0.5em 0;font-size:0.85em">{"".join(cells)}</div>'
 
 
 def _pose(scene: Scene) -> str:

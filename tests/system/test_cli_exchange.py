@@ -74,7 +74,7 @@ def refused(answer, code: int, *words: str) -> None:
 
 
 def test_planar_contacts_with_a_known_outline_are_imported_estimated_and_judged(inside, tmp_path):
-    data = planar_data.simulate("rectangle", 3, count=5)
+    data = planar_data.simulate("rectangle", 3, count=7)
     rows = [
         {name: value for name, value in row.items() if name not in ("z_m", "nz")}
         for row in timed(data.grasps, data.world_T_body)
@@ -85,12 +85,12 @@ def test_planar_contacts_with_a_known_outline_are_imported_estimated_and_judged(
     imported = inside("session", "import", tmp_path / "other.json", "--json")
     assert imported.code == 0, imported.err
     log = json.loads(imported.out)
-    assert (log["dimension"], log["grasps"], log["contacts"]) == (2, 5, len(rows))
+    assert (log["dimension"], log["grasps"], log["contacts"]) == (2, 7, len(rows))
     answer = inside("reconstruct", log["log"], "--out", tmp_path / "out", "--seed", 1, "--json")
     assert answer.code == 0, answer.err
     judged = json.loads(answer.out)
     assert (judged["object"], judged["status"]) == ("rectangle", "complete")
-    assert judged["truth"] == {"seen": 5, "missing": 0, "mesh": True}
+    assert judged["truth"] == {"seen": 7, "missing": 0, "mesh": True}
     assert judged["shape_best_fit"]["hausdorff_mm"] < 10.0
     assert judged["pose"]["rmse_mm"] < 15.0
 

@@ -236,7 +236,7 @@ class Gpis:
     def _rows_of(self, asked: NDArray[np.intp]) -> NDArray[np.intp]:
         """Rows of each of some contacts, shape (a, e): its value and normal, or the thesis's points on and off it."""
         count = 1 + self.contacts_m.shape[1] if self._gradient_count else POINTS_A_CONTACT
-        return asked[:, None] + len(self.contacts_m) * np.arange(count)
+        return np.asarray(asked[:, None] + len(self.contacts_m) * np.arange(count))
 
     @cached_property
     def sigma_inflation(self) -> float:

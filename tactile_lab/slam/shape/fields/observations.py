@@ -13,7 +13,7 @@ LARGEST_SPREAD_m = 2.0
 """Contacts of a graspable object lie closer together than this; larger distances mean wrong units."""
 
 POINTS_A_CONTACT = 3
-"""Of the thesis's rows: on it, outside and inside (section 2.2.2)."""
+"""On it, outside and inside, where normals are not observed."""
 
 _OUTER_SPHERE_POINTS, _INNER_SPHERE_POINTS = 60, 12
 _OUTER_SPHERE_RATIO, _INNER_SPHERE_RATIO = 1.3, 0.4

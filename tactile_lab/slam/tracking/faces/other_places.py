@@ -56,6 +56,7 @@ class Place:
 
 
 def search_of(contact_map: ContactMap) -> Search:
+    """The settings for a trajectory in the plane or in space."""
     return _IN_SPACE if contact_map.dimension == 3 else _IN_PLANE
 
 

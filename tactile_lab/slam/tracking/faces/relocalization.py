@@ -130,8 +130,9 @@ def _try(contact_map: ContactMap, place: Place, sharp: FacetedScorer) -> Hypothe
 
 
 def _onto_others(known: ContactMap, grasps: Sequence[int]) -> dict[int, Matched]:
-    """The field of all other grasps, for each of these."""
-    return {index: known.without_grasp(index).fit() for index in grasps}
+    """The field of all other grasps, for each of these; none where no other has a contact."""
+    others = {index: known.without_grasp(index) for index in grasps}
+    return {index: rest.fit() for index, rest in others.items() if len(rest.contacts)}
 
 
 def _onto_solid(best: Hypothesis, sharp: FacetedScorer) -> dict[int, Matched]:

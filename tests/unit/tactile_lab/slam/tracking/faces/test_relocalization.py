@@ -208,9 +208,16 @@ def test_a_grasp_whose_contacts_fit_badly_is_found_its_place_on_an_outline(outli
     assert not found.map.placed[grasp].left_out
 
 
-def test_a_grasp_alone_has_no_other_place() -> None:
+def test_a_grasp_alone_has_no_other_place(outline: ContactMap) -> None:
+    """One grasp is all there is, or all whose contacts are used: there is nothing else to drive it onto."""
     alone = judge_of(OUTLINE_OF_ONE).better(OUTLINE_OF_ONE)
     assert Relocalizer(judge_of(OUTLINE_OF_ONE), NOISE, ProposalSettings()).improve(alone) is alone
+    only = outline
+    for index in range(1, COUNT):
+        for contact in range(len(outline.placed[index].contacts_world)):
+            only = only.without_contact(index, contact)
+    kept = judge_of(outline).better(only)
+    assert Relocalizer(judge_of(outline), NOISE, ProposalSettings()).improve(kept).cost <= kept.cost
 
 
 def test_grasps_that_fit_an_outline_stay(outline: ContactMap) -> None:
