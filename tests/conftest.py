@@ -21,6 +21,10 @@ REPOSITORY = Path(__file__).resolve().parent.parent
 # A shell without job control starts what runs in the background with Ctrl+C ignored, and children inherit that.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
+# Sessions with physics are chaotic: a last digit decides where a finger is some grasps later, and OpenBLAS has kernels
+# with other last digits for other processors. These run on all of them, so that stored values hold. Numpy comes later.
+os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
+
 # On a busy machine any example may take long: nothing is wrong with it then.
 settings.register_profile("tests", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("tests")

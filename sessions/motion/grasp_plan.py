@@ -33,6 +33,21 @@ class TouchPlace:
 
 
 @dataclass(frozen=True)
+class Opening:
+    """What is open from above, so that one finger can go in.
+
+    Attributes:
+        half_m: how far its walls are expected from its middle.
+        rim_m: height of its rim.
+        deepest_m: how low a fingertip may go.
+    """
+
+    half_m: float
+    rim_m: float
+    deepest_m: float
+
+
+@dataclass(frozen=True)
 class GraspPlan:
     """One grasp to execute.
 
@@ -44,6 +59,7 @@ class GraspPlan:
         tap: touch first: tap on the top, or from the side touch the side that the hand comes from.
         only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
         places: where it touches that side, one after another.
+        opening: one finger goes down into it, in the frame's origin, and touches floor and walls.
         may_shift: where a fingertip lands the hand may try again a little aside.
         may_rise: where only a link lands it may try again higher.
         is_gentle: fingertips press less than usual: what they hold leans easily.
@@ -57,6 +73,7 @@ class GraspPlan:
     tap: bool = False
     only_touch: bool = False
     places: tuple[TouchPlace, ...] = ()
+    opening: Opening | None = None
     may_shift: bool = True
     may_rise: bool = True
     is_gentle: bool = False

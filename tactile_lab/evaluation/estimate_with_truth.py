@@ -6,17 +6,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import trimesh
 from gtsam import Pose3
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
-from drivers.core.poses import transform_points
 from tactile_lab.evaluation.files.mesh_io import read_mesh
 from tactile_lab.evaluation.files.results import Results
 from tactile_lab.evaluation.files.tables import read_contour
-from tactile_lab.evaluation.registration import registration_rms_mm
+from tactile_lab.evaluation.registration import in_object_m, registration_rms_mm
 from tactile_lab.evaluation.shape import (
     ShapeComparison,
     compare_contour,
@@ -93,12 +91,9 @@ class EstimateWithTruth:
     @property
     def placed_contacts_m(self) -> Array:
         """Contacts of all placed grasps in the estimate's object frame, shape (m, d)."""
-        placed = [
-            transform_points(pose.inverse(), rows.points_world_m)
-            for pose, rows in zip(self.poses, self.results.contacts, strict=True)
-            if pose is not None
-        ]
-        return np.vstack([np.empty((0, 3)), *placed])[:, : self.results.dimension]
+        placed = zip(self.results.contacts, self.poses, strict=True)
+        points_m = in_object_m((rows.points_world_m, pose) for rows, pose in placed if pose is not None)
+        return points_m[:, : self.results.dimension]
 
     @cached_property
     def registration_rms_mm(self) -> float | None:

@@ -6,7 +6,7 @@ with the estimated and once with the true poses, and compared after one best rig
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from gtsam import Pose3
@@ -48,14 +48,17 @@ def registration_rms_mm(
     used = [pair for pair in compared_grasps(estimate, truth) if len(contacts_world_m[pair.index])]
     if len(used) < 2:
         return None
-    placed = _place([(contacts_world_m[pair.index], pair.estimate) for pair in used])[:, :dimension]
-    true = _place([(contacts_world_m[pair.index], pair.truth) for pair in used])[:, :dimension]
+    placed = in_object_m((contacts_world_m[pair.index], pair.estimate) for pair in used)[:, :dimension]
+    true = in_object_m((contacts_world_m[pair.index], pair.truth) for pair in used)[:, :dimension]
     residuals = _rigid_fit(placed, true) - true
     return 1e3 * float(np.sqrt(np.mean(np.sum(residuals**2, axis=1))))
 
 
-def _place(grasps: Sequence[tuple[Array, Pose3]]) -> Array:
-    return np.concatenate([transform_points(pose.inverse(), points) for points, pose in grasps])
+def in_object_m(grasps: Iterable[tuple[Array, Pose3]]) -> Array:
+    """Contact points of grasps, shape (n, 3) each in the world frame, in the frame of an object at its pose at each
+    grasp, shape (m, 3).
+    """
+    return np.vstack([np.empty((0, 3)), *(transform_points(pose.inverse(), points) for points, pose in grasps)])
 
 
 def _rigid_fit(source: Array, target: Array) -> Array:

@@ -16,7 +16,6 @@ from typing import Any
 
 import pytest
 
-from tests.support.plain_values import plain
 from tests.support.repository import REPOSITORY
 
 FOLDER = REPOSITORY / "tests" / "baseline"
@@ -36,6 +35,8 @@ def assert_baseline(name: str, values: Mapping[str, Any], *, rtol: float = 1e-6,
             and texts have to be the same.
         rtol, atol: a number may differ by ``atol + rtol * |stored|``, times what the environment's BASELINE_SHARE says.
     """
+    from tests.support.plain_values import plain  # numpy, which asks the tests' configuration for its kernels
+
     _asked.add(f"{name}.json")
     file, now = FOLDER / f"{name}.json", _rounded(plain(values))
     stored = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}

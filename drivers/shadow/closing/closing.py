@@ -262,7 +262,7 @@ def closing(name: str, height_m: float, hand: HandShape | None = None) -> Closin
         )
     hand = hand or HandShape()
     if hand.form.is_left:
-        return _mirror(name, closing(mirrored_closing(name), height_m, hand.mirrored))
+        return mirrored(name, closing(mirrored_closing(name), height_m, hand.mirrored))
     if name in LEANING:
         return _leaning(name, LEANING[name], height_m, hand)
     if name in SIDEWAYS:
@@ -283,7 +283,7 @@ def _upright(name: str, height_m: float, hand: HandShape) -> Closing:
     return Closing(name, height_m, hand.radius_m, postures.grasp_T_palm, paths, postures.tables_rad, form=hand.form)
 
 
-def _mirror(name: str, table: Closing) -> Closing:
+def mirrored(name: str, table: Closing) -> Closing:
     """A right hand's closing as the left hand does it."""
     x, y, z = table.approach
     turn, place = table.grasp_T_palm.rotation().matrix(), table.grasp_T_palm.translation()

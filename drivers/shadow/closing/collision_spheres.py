@@ -64,7 +64,11 @@ def link_balls(name: str, height_m: float, hand: HandShape) -> CollisionSpheres:
     if hand.form.is_left:
         right = link_balls(mirrored_closing(name), height_m, hand.mirrored)
         return replace(right, centres_m=right.centres_m * MIRROR)
-    table = closing(name, height_m, hand)
+    return balls_of(closing(name, height_m, hand))
+
+
+def balls_of(table: Closing) -> CollisionSpheres:
+    """The links in a right hand's closing."""
     links = _grasp_T_links(table)
     centres, radii, fingers = [], [], []
     for index, finger in enumerate(table.fingers):

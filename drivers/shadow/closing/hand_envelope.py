@@ -58,7 +58,7 @@ def open_hand(name: str, height_m: float, hand: HandShape) -> HandEnvelope:
     table, links = closing(name, height_m, hand), link_balls(name, height_m, hand)
     first = np.argmax(links.usable, axis=0)[links.fingers]
     tips_m = np.array([table.path(finger).centre_m(table.path(finger).valid[0]) for finger in table.fingers])
-    palm_m, palm_radii_m = _palm_and_forearm(table)
+    palm_m, palm_radii_m = palm_and_forearm(table)
     return HandEnvelope(
         np.concatenate([palm_m, links.centres_m[first, np.arange(len(first))], tips_m]),
         np.concatenate([palm_radii_m, links.radii_m, np.full(len(tips_m), max(hand.semi_axes_m))]),
@@ -83,7 +83,7 @@ def lowest_inside_m(name: str, height_m: float, hand: HandShape) -> float:
     return float((centres_m[:, 2] - links.radii_m)[inside_m > _INSIDE_m].min(initial=np.inf))
 
 
-def _palm_and_forearm(table: Closing) -> tuple[Array, Array]:
+def palm_and_forearm(table: Closing) -> tuple[Array, Array]:
     """Centres (n, 3) and radii (n,) of the balls of what does not move while the hand closes, grasp frame."""
     grasp_T_forearm = table.grasp_T_palm * forearm_T_palm(_STRAIGHT).inverse()
     forearm_T_wrist = Pose3(link_T_matrices(_STRAIGHT[None])[0, JOINT_INDEX["WRJ2"]])

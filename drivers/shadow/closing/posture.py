@@ -214,7 +214,7 @@ class _Solver:
         fingers, form = self._fingers, self._hand.form
         columns = {finger: [self._moved.index(joint) for joint in moved_joints(finger, form)] for finger in fingers}
         return Postures(
-            Pose3(Rot3(_palm_rotations(palm[None])[0]), palm[:3]),
+            Pose3(Rot3(palm_rotations(palm[None])[0]), palm[:3]),
             {finger: table[:, columns[finger]] for finger in fingers},
             {finger: _longest_run(good[:, index]) for index, finger in enumerate(fingers)},
         )
@@ -223,7 +223,7 @@ class _Solver:
         vectors = np.zeros((len(joints), len(JOINTS)))
         vectors[:, self._columns] = joints
         palm_T_distal = palm_T_distal_matrices(vectors)[:, self._finger_rows]
-        palm_rotation = _palm_rotations(palm)[:, None]
+        palm_rotation = palm_rotations(palm)[:, None]
         rotations = palm_rotation @ palm_T_distal[..., :3, :3]
         origins_m = (palm_rotation @ palm_T_distal[..., :3, 3, None])[..., 0] + palm[:, None, :3]
         centres_m = origins_m + rotations @ np.array(self._hand.centre_distal_m)
@@ -252,7 +252,7 @@ def _leaning(direction_xy: Array) -> Array:
     return np.column_stack([np.sin(LEAN_rad) * unit, np.full(len(unit), -np.cos(LEAN_rad))])
 
 
-def _palm_rotations(palm: Array) -> Array:
+def palm_rotations(palm: Array) -> Array:
     """Rotations (b, 3, 3) of palms (b, 5): nose-down tilt about y after roll about x, from palm down."""
     (ct, st), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (palm[:, 3], palm[:, 4]))
     zero = np.zeros_like(ct)

@@ -61,6 +61,7 @@ class StandingCandidate:
         depth_m: of a grasp from the side, behind the object's front.
         further_m: where else contacts are expected as the hand touches on, shape (n, 3), world.
         on_top: whether they are on the top, not on sides.
+        normals: outward ones there, shape (m, 3), of what is inside; None on top and sides.
     """
 
     plan: GraspPlan
@@ -69,6 +70,7 @@ class StandingCandidate:
     depth_m: float = 0.0
     further_m: Array = field(default_factory=lambda: np.empty((0, 3)))
     on_top: bool = False
+    normals: Array | None = None
 
     @property
     def touches_m(self) -> Array:

@@ -14,6 +14,7 @@ from drivers.core.contacts import ApproachPath, Array, Grasp
 from sessions.conductor.object_gone import OPENING_m
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
+from tactile_lab.autonomy.standing.openings import Openings
 from tactile_lab.autonomy.standing.roundness import is_round
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
 from tactile_lab.autonomy.standing.storeys import Storeys, storeys_of
@@ -28,8 +29,8 @@ pushes it away, and makes it lean."""
 _FAR_m, _NEAR_m = 0.04, 0.010
 """What is touched farther than the first from all contacts is as new as can be; nearer than the second it is known."""
 
-_OPEN_m = (0.012, 0.025)
-"""A fingertip that comes down so far from all contacts has met nothing, and the next one so near would not either."""
+_RIM_m = 0.040
+"""What is no lower below the top narrows an opening."""
 
 _SLENDER = 0.2
 """Of its height the foot reaches from the middle. A box on a bulged bottom creeps over by a degree in every touch."""
@@ -58,6 +59,7 @@ class FeltObject:
     Attributes:
         box: around it, as felt.
         grasps: that were added.
+        openings: where it is open from above.
     """
 
     box: BoundingBox
@@ -69,7 +71,7 @@ class FeltObject:
     _looked_m: dict[bool, Array] = field(default_factory=lambda: {True: _nowhere(), False: _nowhere()})
     """Places on the top, and on sides."""
 
-    _open_m: Array = field(default_factory=_nowhere)
+    openings: Openings = field(default_factory=Openings)
     _passed_m: list[Array] = field(default_factory=list)
     _pushed: Array | None = None
     _first: BoundingBox = field(init=False)
@@ -156,7 +158,7 @@ class FeltObject:
         self._looked_m[on_top] = np.vstack([self._looked_m[on_top], places_m])
 
     def look_again(self) -> None:
-        """Places where contacts were expected and found elsewhere, or nowhere, are new again."""
+        """Places on top and sides where contacts were expected and found elsewhere, or nowhere, are new again."""
         self._looked_m = {True: _nowhere(), False: _nowhere()}
 
     def on_pushed(self, way: Array) -> None:
@@ -166,8 +168,7 @@ class FeltObject:
 
     def on_missed_top(self, places_m: Array) -> None:
         """Fingertips of a tap were expected at these places, (n, 3), world: those far from all contacts met nothing."""
-        missed_m = places_m[self._apart_m(places_m, self._points_m) > _OPEN_m[0]]
-        self._open_m = np.vstack([self._open_m, missed_m])
+        self.openings.on_missed(places_m, self._apart_m(places_m, self._points_m))
 
     def on_passed(self, paths: Sequence[ApproachPath]) -> None:
         """Fingertips that came to touch a side have gone these ways."""
@@ -230,8 +231,18 @@ class FeltObject:
 
     def are_open(self, places_m: Array) -> NDArray[np.bool_]:
         """Whether a tap has met nothing near places of the top, (n, 3), and nearer than any contact is, shape (n,)."""
-        missed_m, met_m = (self._apart_m(places_m, some) for some in (self._open_m, self._points_m))
-        return missed_m < np.minimum(_OPEN_m[1], met_m)
+        return self.openings.are_open(places_m, self._apart_m(places_m, self._points_m))
+
+    def opening(self) -> tuple[Array, float] | None:
+        """The middle of what is open from above, world x, y, and how far from it the nearest contact is, if any."""
+        high = self._points_m[:, 2] > (self.box.top_m or 0.0) - _RIM_m
+        return self.openings.widest(self._points_m[high, :2])
+
+    def inside_distances_m(self, places_m: Array, normals: Array) -> Array:
+        """Of places inside an opening, with outward normals, shape (n, 3) each, to the nearest where a contact was that
+        faces alike, or was expected before, shape (n,), at most 40 mm.
+        """
+        return np.minimum(self.openings.apart_m(places_m, normals, self._points_m, self._normals), _FAR_m)
 
     def passed_m(self, place_m: Array, way: Array) -> float:
         """How far beyond a place of a side, shape (3,), fingertips went along a horizontal unit vector, shape (2,), at

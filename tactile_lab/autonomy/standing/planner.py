@@ -17,6 +17,7 @@ from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_plan import GraspPlan
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate, approach_of
 from tactile_lab.autonomy.standing.felt_object import FeltObject
+from tactile_lab.autonomy.standing.inside_planner import InsidePlanner
 from tactile_lab.autonomy.standing.rim_planner import RimPlanner
 from tactile_lab.autonomy.standing.search import Whereabouts
 from tactile_lab.autonomy.standing.side_planner import SidePlanner
@@ -76,12 +77,14 @@ class StandingPlanner:
     _grasping: SidePlanner = field(init=False)
     _touching: TouchPlanner | None = field(init=False)
     _pinching: RimPlanner = field(init=False)
+    _reaching_in: InsidePlanner = field(init=False)
 
     def __post_init__(self) -> None:
         self.whereabouts = Whereabouts(self.felt, self.searches)
         where = (self.felt, self.hand, self.yaw_window_rad, self.reach)
         lowest_m = (self.settings or TouchSettings()).side_heights_m
         self._grasping, self._pinching = SidePlanner(*where, lowest_m), RimPlanner(*where)
+        self._reaching_in = InsidePlanner(*where)
         self._touching = None if self.settings is None else TouchPlanner(*where, self.settings)
 
     def plan(self) -> GraspPlan | None:
@@ -97,8 +100,8 @@ class StandingPlanner:
 
     def _best(self) -> StandingCandidate | None:
         """What would tell most; None where nothing would tell anything new."""
-        touch = None if self._touching is None else self._touching.best()
-        offers = [self._grasping.best(), self._pinching.best(), touch]
+        touches = [] if self._touching is None else [self._touching.best(), self._reaching_in.best()]
+        offers = [self._grasping.best(), self._pinching.best(), *touches]
         return max((one for one in offers if one), key=lambda one: one.score_m, default=None)
 
     def touch(self) -> GraspPlan | None:
@@ -113,7 +116,10 @@ class StandingPlanner:
             return
         self._touches += done.plan.only_touch
         self.whereabouts.on_grasp(grasp, done, approach_of(done.plan, self.hand))
-        self.felt.on_looked(done.touches_m, on_top=done.on_top)
+        if done.normals is not None:
+            self.felt.openings.on_looked(done.touches_m, done.normals)
+        else:
+            self.felt.on_looked(done.touches_m, on_top=done.on_top)
         if done.plan.only_touch and done.plan.places:
             self.felt.on_pushed(approach_of(done.plan, self.hand))
             self.felt.on_passed(grasp.approach_paths)

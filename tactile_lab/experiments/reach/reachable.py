@@ -1,10 +1,10 @@
 """Which places of an object's surface a fingertip can get to, by the hand's geometry alone.
 
-A place is in reach if the hand can take up some posture of one of its closings, taps or touches in which a fingertip
-meets it, with palm, forearm, links and all other fingertips clear of object and table there and on the way in. Neither
-what was planned nor what was touched matters, nor whether the object would tip over, nor whether a planner offers that
-action for an object like this. So the lower part of a cup's inside is out of reach where the knuckles meet the rim
-before a fingertip gets there.
+A place is in reach if the hand can take up some posture of one of its closings, taps or touches, or with one finger
+down inside something, in which a fingertip meets it, with palm, forearm, links and all other fingertips clear of object
+and table there and on the way in. Neither what was planned nor what was touched matters, nor whether the object would
+tip over, nor whether a planner offers that action for an object like this. So the lowest part of a deep cup's inside is
+out of reach, where the knuckles meet the rim before a fingertip gets there.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from scipy.ndimage import map_coordinates
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import LEANING, PRESHAPES, SIDEWAYS, Closing, closing
 from drivers.shadow.closing.collision_spheres import link_balls
+from drivers.shadow.closing.finger_down import LEANS_rad, finger_down
 from drivers.shadow.closing.hand_envelope import open_hand
 from drivers.shadow.closing.posture import PROGRESS, HandShape
 from sessions.motion.probing.touch_patterns import COLUMN, TAP, TAP_HEIGHT_m
@@ -47,6 +48,12 @@ _STEEPEST = -0.5
 """Cosine between a fingertip's way and the surface's normal: beyond 60 degrees it slips aside."""
 
 _WAY_m = (0.02, 0.05, 0.09, 0.13)
+_ANY_HEIGHT_m = (0.0, np.inf)
+_DOWN = np.array([0.0, 0.0, -1.0])
+
+_FROM_WALL_m = 0.010
+"""A finger goes down so far from the wall that it then touches."""
+
 _GRID_m, _MARGIN_m = 0.004, 0.02
 _AT_ONCE = 20_000
 
@@ -60,7 +67,7 @@ class _Posture:
         balls_m, radii_m: all else of the hand, shapes (n, 3), (n,).
         way: the direction in which the fingertip comes, unit.
         opened_m, opened_radii_m: all of the hand on its way in.
-        approach: the direction in which the hand comes, unit.
+        before_m: where the opened hand is on its way in, seen from there, shape (k, 3).
         heights_m: lowest and highest that the fingertip's centre may be.
     """
 
@@ -70,7 +77,7 @@ class _Posture:
     way: Array
     opened_m: Array
     opened_radii_m: Array
-    approach: Array
+    before_m: Array
     heights_m: tuple[float, float]
 
 
@@ -128,9 +135,8 @@ def _is_clear(grid: SignedGrid, floor_m: float, posture: _Posture, turn: Array, 
     balls_m, opened_m = posture.balls_m @ turn.T, posture.opened_m @ turn.T
     lowest_m = (balls_m[:, 2] - posture.radii_m).min()
     clear = np.asarray(moves_m[:, 2] + lowest_m > floor_m - _DENTED_m)
-    backward = turn @ -posture.approach
     for places_m, radii_m in [(balls_m, posture.radii_m)] + [
-        (opened_m + away_m * backward, posture.opened_radii_m) for away_m in _WAY_m
+        (opened_m + away_m, posture.opened_radii_m) for away_m in posture.before_m @ turn.T
     ]:
         for rows in np.array_split(np.flatnonzero(clear), 1 + clear.sum() * len(radii_m) // (100 * _AT_ONCE)):
             apart_m = grid.distances_m(moves_m[rows, None] + places_m) - radii_m
@@ -150,6 +156,7 @@ def _postures(hand: HandShape) -> Iterator[_Posture]:
     for height_m in _HEIGHTS_m:
         for name in (*PRESHAPES, *LEANING):
             yield from _closing_postures(closing(name, height_m, hand), _AROUND_m, hand)
+    yield from _inside_postures(hand)
 
 
 def _closing_postures(table: Closing, around_m: float, hand: HandShape) -> Iterator[_Posture]:
@@ -165,16 +172,30 @@ def _closing_postures(table: Closing, around_m: float, hand: HandShape) -> Itera
                 height_m = float(path.centre_m(PROGRESS[node])[2])
                 parts = _parts(table, nodes, index, hand)
                 heights_m = height_m - around_m, height_m + around_m
-                yield _Posture(
-                    *parts, path.direction, opened.centres_m, opened.radii_m, np.array(table.approach), heights_m
-                )
+                way = path.direction
+                yield _Posture(*parts, way, opened.centres_m, opened.radii_m, _straight(table), heights_m)
 
 
 def _held_posture(table: Closing, progress: Mapping[str, float], finger: str, hand: HandShape) -> _Posture:
     """All fingers at a progress of their own while the hand moves."""
     nodes = np.array([round(progress[f] * (len(PROGRESS) - 1)) for f in table.fingers])
-    parts, approach = _parts(table, nodes, table.fingers.index(finger), hand), np.array(table.approach)
-    return _Posture(*parts, approach, *parts[1:], approach, (0.0, np.inf))
+    parts = _parts(table, nodes, table.fingers.index(finger), hand)
+    return _Posture(*parts, np.array(table.approach), *parts[1:], _straight(table), _ANY_HEIGHT_m)
+
+
+def _straight(table: Closing) -> Array:
+    """The way of a hand that comes straight to a closing."""
+    return np.outer(_WAY_m, -np.array(table.approach))
+
+
+def _inside_postures(hand: HandShape) -> Iterator[_Posture]:
+    """One finger down, onto a floor and, from a little aside, against a wall."""
+    up_m = np.outer((0.0, *_WAY_m), [0.0, 0.0, 1.0])
+    for posture in (finger_down(lean_rad, hand) for lean_rad in LEANS_rad):
+        rest = posture.balls_m, posture.radii_m
+        yield _Posture(posture.tip_m, *rest, _DOWN, *rest, up_m, _ANY_HEIGHT_m)
+        aside_m = up_m - _FROM_WALL_m * posture.ahead
+        yield _Posture(posture.tip_m, *rest, posture.ahead, *rest, aside_m, _ANY_HEIGHT_m)
 
 
 def _parts(table: Closing, nodes: NDArray[np.intp], index: int, hand: HandShape) -> tuple[Array, Array, Array]:

@@ -1,8 +1,8 @@
 """A body that is open from above, as a cup: hollow within a wall of the same thickness everywhere.
 
 Fingers that came down inside a rim tell that there is a cavity, but a model of what they touched closes it with a lid.
-Contacts on the rim tell how thick the wall is. How deep the cavity is nobody touched: it is assumed to leave as much
-for the floor, and both are the less certain the deeper they lie.
+Contacts on the rim and inside tell how thick the wall is. Where no fingertip met the floor, it is assumed to be as
+thick as the wall, and the less certain the less deep a finger was.
 """
 
 from __future__ import annotations
@@ -11,42 +11,40 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import Delaunay, QhullError
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.shape.model import FittedShape
+from tactile_lab.slam.shape.solids.rim import UPWARD, BELOW_m, Rim
 from tactile_lab.slam.shape.solids.solid_field import SolidField
 from tactile_lab.slam.shape.solids.walls import ON_SURFACE_m, THICKEST_m, Walls
 from tactile_lab.slam.shape.surfaces.surface import Contour, Mask, SurfaceMesh, extract_mesh
 
-_UPWARD = 0.7
-"""Least vertical part of a normal on the rim."""
-
-_RIM_m = 0.020
-"""Contacts on the rim are no lower below the highest."""
-
-_BELOW_RIM_m, _WITHIN_m = 0.004, 0.008
-"""A finger is in a cavity so far below the rim, over what the model takes for solid so far from its sides: not beside a
-neck, over a shoulder.
+_WITHIN_m = 0.008
+"""A finger is in a cavity over what the model takes for solid so far from its sides: not beside a neck, over a
+shoulder.
 """
 
 _LOW = 0.25
 """Share of the height at which that is asked: a model has a dent of its own where rims lean inward."""
 
-_ALIKE_rad = float(np.deg2rad(60.0))
-"""A rim is about as far from its middle in directions that differ by less."""
+_BESIDE_rad, _BESIDE_m = float(np.deg2rad(30.0)), 0.025
+"""A wall's outside tells of a place inside where its direction and height differ by less."""
 
 _FINGER_m = 0.008
 """Fingertips outside a wall that leans over them come no nearer than that."""
+
+_BEYOND_m = 0.005
+"""Nothing of the body is so far outside of an outer wall."""
 
 _RIM_WALL_m, _GRID_m = 0.008, 0.003
 _THICKNESS_m, _LEAST_FLOOR_m = (0.004, THICKEST_m), 0.006
 """Of walls, none so thin that the grid misses it, and least thickness of the floor."""
 
 _THICKNESS_SIGMA_m, _SIGMA_PER_DEPTH = 0.0015, 0.05
+"""Where the wall's thickness was felt, and for each depth below."""
 
 
 @dataclass(frozen=True)
@@ -57,31 +55,29 @@ class Hollow:
         body: the model whose outside it has.
         outside: the body's surface.
         gpis: the field of all contacts.
-        middle_m: of the places where fingers were in the cavity, shape (3,).
-        wall_m: thickness of the wall.
-        rim_m: height of the rim.
+        walls: of the outside.
+        wall_m: their thickness.
+        felt_m: lowest height at which it was felt, that of the rim where nothing was inside.
         entered_m: lowest height at which a finger was in the cavity.
+        bottom_m, bottom_sigma_m: height at which the cavity ends, and its standard deviation.
         floor_m: height of the table.
     """
 
     body: FittedShape
     outside: SurfaceMesh
     gpis: Gpis
-    middle_m: Array
+    walls: Walls
     wall_m: float
-    rim_m: float
+    felt_m: float
     entered_m: float
+    bottom_m: float
+    bottom_sigma_m: float
     floor_m: float
 
     @property
     def name(self) -> str:
         """Of the body, "hollow"."""
         return f"hollow {self.body.name}"
-
-    @property
-    def bottom_m(self) -> float:
-        """Height at which the cavity ends."""
-        return self.floor_m + max(self.wall_m, _LEAST_FLOOR_m)
 
     @property
     def share_off(self) -> float:
@@ -121,7 +117,6 @@ class _HollowField:
     def __init__(self, shape: Hollow) -> None:
         mesh = shape.outside
         self._shape, self._body = shape, SolidField(mesh, mesh.sigma_m)
-        self._walls = Walls.of(mesh).facing_away(shape.middle_m)
         self.contacts_m = np.vstack([shape.gpis.contacts_m, mesh.vertices[mesh.vertices.argmin(axis=0)]])
 
     def predict(self, points_m: Array, *, gradient: bool = False, variance: bool = False) -> Prediction:
@@ -147,16 +142,15 @@ class _HollowField:
         """How far places (q, 3) are inside the cavity, whether its wall is nearer than its floor, and the directions
         away from the wall.
         """
-        away_m, inward = self._walls.away(points_m)
+        away_m, inward = self._shape.walls.away(points_m)
         to_wall_m, to_floor_m = away_m - self._shape.wall_m, points_m[:, 2] - self._shape.bottom_m
         is_wall = to_wall_m < to_floor_m
         return np.where(is_wall, to_wall_m, to_floor_m), is_wall, inward
 
     def _sigma_m(self, heights_m: Array, is_wall: Mask) -> Array:
         shape = self._shape
-        wall_m = np.hypot(_THICKNESS_SIGMA_m, _SIGMA_PER_DEPTH * np.maximum(shape.rim_m - heights_m, 0.0))
-        floor_m = max((shape.entered_m - shape.bottom_m) / 2, _THICKNESS_SIGMA_m)
-        return np.where(is_wall, wall_m, floor_m)
+        wall_m = np.hypot(_THICKNESS_SIGMA_m, _SIGMA_PER_DEPTH * np.maximum(shape.felt_m - heights_m, 0.0))
+        return np.where(is_wall, wall_m, shape.bottom_sigma_m)
 
 
 def hollowed(
@@ -179,67 +173,90 @@ def hollowed(
     Raises:
         ShapeError: the shape encloses nothing.
     """
-    rim = _on_rim(gpis)
-    if free_points_m is None or not rim.any():
+    rim = Rim.of(gpis)
+    if free_points_m is None or not rim.chosen.any():
         return shape
-    rim_m = float(gpis.contacts_m[rim, 2].max())
-    low_m = free_points_m[free_points_m[:, 2] < rim_m - _BELOW_RIM_m]
+    low_m = free_points_m[rim.depths_m(free_points_m) > BELOW_m]
     if not len(low_m):
         return shape
     mesh = shape.mesh(_GRID_m, floor_m).below(float(gpis.contacts_m[:, 2].max()))
     body, walls = SolidField(mesh, 0.0), Walls.of(mesh)
-    low_m = low_m[_surrounded(low_m, np.vstack([gpis.contacts_m[rim], _near_rim(walls, rim_m)]))]
-    entered_m = low_m[_over_solid(low_m, body, floor_m + _LOW * (rim_m - floor_m))]
+    low_m = low_m[rim.surrounded(low_m, np.vstack([rim.contacts_m, _near_rim(walls, rim)]))]
+    entered_m = low_m[_over_solid(low_m, body, floor_m + _LOW * (rim.top_m - floor_m))]
     if not len(entered_m):
         return shape
-    middle_m = entered_m.mean(axis=0)
-    walls = walls.facing_away(middle_m)
-    inside = np.zeros_like(rim) if inside is None else inside
-    wall_m = _thickness_m(walls, gpis.contacts_m[rim & ~inside], gpis.contacts_m[inside])
-    hollow = Hollow(shape, mesh, gpis, middle_m, wall_m, rim_m, float(entered_m[:, 2].min()), floor_m)
+    inside = np.zeros_like(rim.chosen) if inside is None else inside
+    hollow = _hollow(shape, mesh, gpis, _outer(walls, body, entered_m.mean(axis=0)), rim, inside, entered_m, floor_m)
     against = _off(hollow.field, gpis) - _off(body, gpis)
     return hollow if against < len(entered_m) else shape
+
+
+def _hollow(
+    shape: FittedShape,
+    mesh: SurfaceMesh,
+    gpis: Gpis,
+    walls: Walls,
+    rim: Rim,
+    inside: Mask,
+    entered_m: Array,
+    floor_m: float,
+) -> Hollow:
+    """The body with a cavity between its walls, as thick and as deep as contacts on the rim and inside say."""
+    faces_up, lowest_m = gpis.normals[:, 2] > UPWARD, float(entered_m[:, 2].min())
+    on_wall_m, on_floor_m = gpis.contacts_m[inside & ~faces_up], gpis.contacts_m[inside & faces_up]
+    wall_m = _thickness_m(walls, gpis.contacts_m[rim.chosen & ~inside], on_wall_m)
+    felt_m = float(on_wall_m[:, 2].min(initial=rim.top_m))
+    bottom = _bottom_m(on_floor_m[:, 2], wall_m, lowest_m, floor_m)
+    return Hollow(shape, mesh, gpis, walls, wall_m, felt_m, lowest_m, *bottom, floor_m)
 
 
 def are_entered(gpis: Gpis, free_points_m: Array) -> Mask:
     """Which places that a finger went through, shape (k, 3), are below a rim, with contacts on it around them, or no
     farther from such places than a fingertip's width inside the rim in their direction.
     """
-    high_m = _highest(gpis)
-    entered = np.asarray(free_points_m[:, 2] < high_m[:, 2].max(initial=-np.inf) - _BELOW_RIM_m)
+    rim = Rim.of(gpis)
+    entered = np.asarray(rim.depths_m(free_points_m) > BELOW_m)
     low_m = free_points_m[entered]
-    inside = _surrounded(low_m, high_m)
+    inside = rim.surrounded(low_m, np.vstack([rim.highest_m, rim.beside_m]))
     if inside.any():
-        inside |= _within(low_m, high_m, low_m[inside].mean(axis=0), _FINGER_m)
+        inside |= rim.encloses(low_m, low_m[inside].mean(axis=0), _FINGER_m)
     entered[entered] = inside
     return entered
 
 
 def felt_inside(gpis: Gpis, entered_m: Array) -> Mask:
-    """Which contacts, shape (n,), are below a rim and face up, or where fingers came down inside it, shape (k, 3), and
-    are no farther from there than the rim in their direction: those on the near side of a handle face there, too.
+    """Which contacts, shape (n,), are below a rim and inside: they face up, or where fingers came down inside it, shape
+    (k, 3), and are nearer to there than the rim in their direction; or they face there, and are nearer than the outside
+    of the wall at their height. Those on the near side of a handle face there, and those on a shoulder up, too.
     """
-    points_m, high_m, middle_m = gpis.contacts_m, _highest(gpis), entered_m.mean(axis=0)
-    facing = np.einsum("nk,nk->n", (middle_m - points_m)[:, :2], gpis.normals[:, :2]) > 0
-    facing |= gpis.normals[:, 2] > _UPWARD
-    is_low = points_m[:, 2] < high_m[:, 2].max() - _BELOW_RIM_m
-    return np.asarray(facing & is_low & _within(points_m, high_m, middle_m))
+    points_m, rim, middle_m = gpis.contacts_m, Rim.of(gpis), entered_m.mean(axis=0)
+    faces_middle = np.einsum("nk,nk->n", (middle_m - points_m)[:, :2], gpis.normals[:, :2]) > 0
+    faces_up = gpis.normals[:, 2] > UPWARD
+    outside_m = points_m[~(faces_middle | faces_up)]
+    inside = (faces_middle | faces_up) & rim.encloses(points_m, middle_m)
+    inside |= faces_middle & _behind(points_m, outside_m, rim, middle_m)
+    return np.asarray(inside & (rim.depths_m(points_m) > BELOW_m))
 
 
-def _within(places_m: Array, rim_m: Array, middle_m: Array, by_m: float = 0.0) -> Mask:
-    """Which places, seen from above, are nearer to a middle than the rim in their direction, shapes (q, 3), (n, 3) and
-    (3,); none where the rim is not known in about that direction.
+def _behind(points_m: Array, outside_m: Array, rim: Rim, middle_m: Array) -> Mask:
+    """Which places, shape (q, 3), are nearer to a middle than all those on the outside, shape (n, 3), that are beside
+    them in direction and height; none where there is none.
     """
-    away_m, around_m = ((each - middle_m)[:, :2] @ [1.0, 1.0j] for each in (places_m, rim_m))
-    is_known = (np.abs(np.angle(away_m[:, None] * around_m.conj())) < _ALIKE_rad).any(axis=1)
-    there_m = np.interp(np.angle(away_m), np.angle(around_m), np.abs(around_m), period=2 * np.pi)
-    return np.asarray(is_known & (np.abs(away_m) < there_m - by_m))
+    away_m, out_m = ((rim.seen_m(each) - rim.seen_m(middle_m[None])) @ [1.0, 1.0j] for each in (points_m, outside_m))
+    apart_m = np.abs(rim.depths_m(points_m)[:, None] - rim.depths_m(outside_m))
+    beside = (np.abs(np.angle(away_m[:, None] * out_m.conj())) < _BESIDE_rad) & (apart_m < _BESIDE_m)
+    nearest_m = np.where(beside, np.abs(out_m), np.inf).min(axis=1, initial=np.inf)
+    return np.asarray(beside.any(axis=1) & (np.abs(away_m) < nearest_m))
 
 
-def _highest(gpis: Gpis) -> Array:
-    """The contacts on the rim that are no lower below the highest than fingers must be to be inside, shape (k, 3)."""
-    rim_m = gpis.contacts_m[_on_rim(gpis)]
-    return np.asarray(rim_m[rim_m[:, 2] > rim_m[:, 2].max(initial=-np.inf) - 2 * _BELOW_RIM_m])
+def _outer(walls: Walls, body: SolidField, middle_m: Array) -> Walls:
+    """Walls that face away from a middle, without those that have something of the body outside of them, as the sides
+    of a bump on a lid have.
+    """
+    walls = walls.facing_away(middle_m)
+    ways = (walls.middles_m - middle_m) * [1.0, 1.0, 0.0]
+    outside_m = walls.middles_m + _BEYOND_m * ways / np.linalg.norm(ways, axis=1, keepdims=True)
+    return walls.some(body.predict(outside_m).mean_m > 0)
 
 
 def _thickness_m(walls: Walls, on_rim_m: Array, inside_m: Array) -> float:
@@ -248,18 +265,22 @@ def _thickness_m(walls: Walls, on_rim_m: Array, inside_m: Array) -> float:
     return float(np.clip(np.median(found_m), *_THICKNESS_m))
 
 
-def _on_rim(gpis: Gpis) -> Mask:
-    """Which contacts face up and are among the highest, shape (n,)."""
-    heights_m = gpis.contacts_m[:, 2]
-    return np.asarray((gpis.normals[:, 2] > _UPWARD) & (heights_m > heights_m.max() - _RIM_m))
+def _bottom_m(felt_m: Array, wall_m: float, entered_m: float, floor_m: float) -> tuple[float, float]:
+    """Height of the cavity's bottom, and its standard deviation: the lowest contact on it, heights of shape (n,), or as
+    thick as the wall.
+    """
+    if len(felt_m):
+        return float(felt_m.min()), _THICKNESS_SIGMA_m
+    bottom_m = floor_m + max(wall_m, _LEAST_FLOOR_m)
+    return bottom_m, max((entered_m - bottom_m) / 2, _THICKNESS_SIGMA_m)
 
 
-def _near_rim(walls: Walls, rim_m: float) -> Array:
+def _near_rim(walls: Walls, rim: Rim) -> Array:
     """Middles of the triangles of walls close below the rim, shape (n, 3): it goes all around, though few places of it
     were touched.
     """
-    middles_m = walls.middles_m
-    return middles_m[(middles_m[:, 2] < rim_m) & (middles_m[:, 2] > rim_m - _RIM_WALL_m)]
+    depths_m = rim.depths_m(walls.middles_m)
+    return walls.middles_m[(depths_m > 0) & (depths_m < _RIM_WALL_m)]
 
 
 def _over_solid(places_m: Array, body: SolidField, height_m: float) -> Mask:
@@ -273,11 +294,3 @@ def _over_solid(places_m: Array, body: SolidField, height_m: float) -> Mask:
 def _off(field: SolidField | _HollowField, gpis: Gpis) -> int:
     """Number of contacts that are not on a surface."""
     return int(np.count_nonzero(np.abs(field.predict(gpis.contacts_m).mean_m) > ON_SURFACE_m))
-
-
-def _surrounded(places_m: Array, around_m: Array) -> Mask:
-    """Which places, seen from above, others surround; shapes (q, 3), (n, 3)."""
-    try:
-        return np.asarray(Delaunay(around_m[:, :2]).find_simplex(places_m[:, :2]) >= 0)
-    except (QhullError, ValueError):  # they are in a line, or none
-        return np.zeros(len(places_m), dtype=bool)

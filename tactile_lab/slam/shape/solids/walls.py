@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
 from drivers.core.contacts import Array
 from tactile_lab.slam.shape.surfaces.sampling import mesh_arrays
-from tactile_lab.slam.shape.surfaces.surface import Indices, SurfaceMesh
+from tactile_lab.slam.shape.surfaces.surface import Indices, Mask, SurfaceMesh
 
 THICKEST_m = 0.010
 """Of walls of a body that is open from above."""
@@ -45,7 +45,11 @@ class Walls:
         """Those that face away from a place, shape (3,), seen from above."""
         ways = self.middles_m - middle_m
         outward = np.einsum("nk,nk->n", ways[:, :2], _across(self.vertices, self.faces)[:, :2]) > 0
-        return Walls(self.vertices, np.ascontiguousarray(self.faces[outward]))
+        return self.some(outward)
+
+    def some(self, chosen: Mask) -> Walls:
+        """Those of them that are chosen, shape (m,)."""
+        return replace(self, faces=np.ascontiguousarray(self.faces[chosen]))
 
     @property
     def middles_m(self) -> Array:

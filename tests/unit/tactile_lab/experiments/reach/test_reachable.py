@@ -7,6 +7,7 @@ import trimesh
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.posture import HandShape
+from tactile_lab.experiments.data.household import turned
 from tactile_lab.experiments.reach.reachable import ANY_YAW_rad, Mask, are_in_reach
 from tactile_lab.slam.shape.surfaces.sampling import sample_mesh_with_normals
 
@@ -35,6 +36,15 @@ def test_the_inside_of_a_wide_pipe_is_in_reach_near_its_rim_and_that_of_a_narrow
         assert inside.sum() > 10
         assert found[inside & (points_m[:, 2] > TOP_m - 0.03)].any() == near_rim
         assert not found[inside & (points_m[:, 2] < 0.006)].any()
+
+
+def test_the_floor_of_a_dish_is_in_reach_and_that_of_a_deep_pot_is_not() -> None:
+    for top_m, is_reached in ((0.05, True), (0.12, False)):
+        pot = turned([0, 50, 50, 46, 46, 0], [0, 0, 1e3 * top_m, 1e3 * top_m, 5, 5])
+        points_m, normals, found = reached(pot)
+        floor = (normals[:, 2] > 0.9) & (points_m[:, 2] < 0.01) & (np.hypot(*points_m[:, :2].T) < 0.03)
+        assert floor.sum() > 3
+        assert found[floor].any() == is_reached
 
 
 def test_a_hand_that_hardly_turns_reaches_less() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 import trimesh
@@ -14,6 +16,7 @@ from tactile_lab.slam.shape.fields.standing_field import StandingField
 from tactile_lab.slam.shape.solids.hollow import Hollow, are_entered, felt_inside, hollowed
 from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
+from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
 
 WALL_m, RADIUS_m, HIGH_m = 0.005, 0.036, 0.080
@@ -116,6 +119,16 @@ def test_contacts_on_the_inside_of_the_wall_are_known_from_those_behind_a_handle
     assert not felt_inside(cup, IN_CUP_m).any()
 
 
+def test_a_contact_on_the_inside_is_known_by_the_outside_at_its_height_where_the_rim_was_not_felt() -> None:
+    cup = felt(RADIUS_m - WALL_m / 2, on_top=1)
+    out = np.array([-1.0, 0.0, 0.0])
+    near_m = (RADIUS_m - WALL_m) * out + [0.0, 0.0, 0.055]
+    shoulder_m, up = 0.02 * out + [0.0, 0.0, 0.055], np.array([-0.6, 0.0, 0.8])
+    points_m, normals = np.vstack([cup.contacts_m, near_m, shoulder_m]), np.vstack([cup.normals, -out, up])
+    inside = felt_inside(Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad), IN_CUP_m)
+    assert np.flatnonzero(inside).tolist() == [len(cup.contacts_m)]
+
+
 def test_a_contact_on_the_inside_is_known_beyond_the_chords_between_contacts_on_the_rim() -> None:
     cup, between = felt(RADIUS_m - WALL_m / 2), np.radians(18.0)
     out = np.array([np.cos(between), np.sin(between), 0.0])
@@ -144,11 +157,75 @@ def test_a_bowl_whose_rim_leans_inward_is_hollow_though_its_model_has_a_dent() -
     assert isinstance(hollowed(dented, field, free_m, 0.0), Hollow)
 
 
-def test_fingers_were_inside_where_contacts_on_the_rim_are_around_them() -> None:
+@pytest.mark.parametrize(("on_top", "is_inside"), [(10, True), (2, True), (0, False)])
+def test_fingers_were_inside_where_contacts_on_the_rim_and_close_below_are_around_them(
+    on_top: int, is_inside: bool
+) -> None:
     beside_m = np.array([[0.05, 0.0, 0.05], [0.0, 0.0, 0.078], [0.0, 0.0, 0.09]])
-    for on_top, inside in ((10, [True, True, True]), (2, [False, False, False]), (0, [False, False, False])):
-        entered = are_entered(felt(RADIUS_m - WALL_m / 2, on_top), np.vstack([IN_CUP_m, beside_m]))
-        assert entered.tolist() == [*inside, False, False, False]
+    entered = are_entered(felt(RADIUS_m - WALL_m / 2, on_top), np.vstack([IN_CUP_m, beside_m]))
+    assert entered.tolist() == [is_inside] * 3 + [False] * 3
+
+
+def test_walls_far_below_the_top_are_around_no_finger_beside_a_neck() -> None:
+    field = felt(RADIUS_m - WALL_m / 2, 0)
+    neck_m, up = np.array([[0.0, 0.0, HIGH_m + 0.03], [0.004, 0.0, HIGH_m + 0.03]]), np.tile([0.0, 0.0, 1.0], (2, 1))
+    points_m, normals = np.vstack([field.contacts_m, neck_m]), np.vstack([field.normals, up])
+    bottle = Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad)
+    assert not are_entered(bottle, np.array([[0.02, 0.0, HIGH_m + 0.01]])).any()
+
+
+@dataclass(frozen=True)
+class Reached:
+    """A cup that one finger reached into: the hollow model, and its surface."""
+
+    hollow: Hollow
+    mesh: SurfaceMesh
+
+
+def reached(*, on_floor: bool) -> Reached:
+    """Two contacts on the inside of its wall, and perhaps one on its floor."""
+    field = felt(RADIUS_m - WALL_m / 2)
+    within_m = np.array([[RADIUS_m - WALL_m, 0.0, 0.02], [WALL_m - RADIUS_m, 0.0, 0.045], [0.004, 0.002, 0.012]])
+    facing = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    count = 3 if on_floor else 2
+    points_m, normals = np.vstack([field.contacts_m, within_m[:count]]), np.vstack([field.normals, facing[:count]])
+    everything = Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad)
+    free_m = np.column_stack([np.zeros((12, 2)), np.linspace(0.014, 0.072, 12)])
+    inside = felt_inside(everything, free_m[are_entered(everything, free_m)])
+    assert np.flatnonzero(inside).tolist() == [len(field.contacts_m) + at for at in range(count)]
+    hollow = hollowed(StandingField.fit(field, 0.0), everything, free_m, 0.0, inside)
+    assert isinstance(hollow, Hollow)
+    return Reached(hollow, hollow.mesh())
+
+
+def test_the_cavity_ends_where_a_fingertip_met_its_floor() -> None:
+    cup = reached(on_floor=True)
+    assert cup.hollow.bottom_m == pytest.approx(0.012)
+    assert cup.hollow.wall_m == pytest.approx(WALL_m, abs=0.001)
+    floor = (np.linalg.norm(cup.mesh.vertices[:, :2], axis=1) < 0.02) & (cup.mesh.vertices[:, 2] > 0.002)
+    np.testing.assert_allclose(cup.mesh.vertices[floor, 2], 0.012, atol=0.001)
+    assert cup.mesh.sigma_m[floor].max() < 0.002
+
+
+def test_a_wall_is_as_certain_as_at_its_rim_down_to_where_its_inside_was_felt() -> None:
+    cup = reached(on_floor=False)
+    lining, heights_m = cup.mesh.lining, cup.mesh.vertices[:, 2]
+    assert lining is not None
+    assert cup.mesh.sigma_m[lining & (heights_m > 0.022)].max() < 0.002
+    assert heights_m[lining].min() < 0.018
+
+
+def test_a_bump_on_a_lid_is_no_wall() -> None:
+    field = felt(RADIUS_m - WALL_m / 2)
+    fitted = StandingField.fit(field, 0.0)
+    lid = turned([0, 36, 36, 28, 28, 24, 24, 0], [0, 0, 80, 80, 76, 76, 79, 79])
+    vertices, normals = np.asarray(lid.vertices), np.asarray(lid.vertex_normals)
+    mesh = SurfaceMesh(vertices, np.asarray(lid.faces), np.full(len(vertices), 0.001), normals, True)
+    bumped = replace(fitted)
+    object.__setattr__(bumped, "mesh", lambda *_: mesh)
+    hollow = hollowed(bumped, field, IN_CUP_m, 0.0)
+    assert isinstance(hollow, Hollow)
+    assert np.hypot(*hollow.walls.middles_m[:, :2].T).min() > RADIUS_m - 0.002
 
 
 def test_nothing_of_a_hollow_body_is_higher_than_what_was_touched() -> None:
