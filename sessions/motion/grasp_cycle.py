@@ -19,7 +19,7 @@ from sessions.motion.grasp_plan import GraspPlan, TouchPlace, evade
 from sessions.motion.holding import HoldingForces
 from sessions.motion.lift import Lift, LiftEnd
 from sessions.motion.motion import Motion
-from sessions.motion.probing.inside_touch import InsideToucher
+from sessions.motion.probing.one_finger import OneFingerToucher
 from sessions.motion.probing.touching import SideTouch
 from sessions.motion.travel import travel_height_m
 from sessions.motion.weighing import Grip, Weigher
@@ -51,7 +51,7 @@ class GraspCycle:
         yaw_window_rad: tuple[float, float] = (-np.pi, np.pi),
     ) -> None:
         self._motion, self.settings = motion, settings
-        self._toucher = InsideToucher(motion, settings, hand or HandShape())
+        self._toucher = OneFingerToucher(motion, settings, hand or HandShape())
         self._arrival = Arrival(motion, settings, hand or HandShape())
         self._hand, self._yaw_window_rad = hand or HandShape(), yaw_window_rad
         self._plan: GraspPlan | None = None
@@ -132,6 +132,9 @@ class GraspCycle:
 
     def _touch(self, plan: GraspPlan) -> bool:
         """Only touch, and rise again."""
+        if plan.down_to_m is not None:
+            self._toucher.touch_top(plan.frame, plan.down_to_m)
+            return True
         if plan.opening is not None:
             self._toucher.touch_inside(plan.frame, plan.opening)
             return True

@@ -59,6 +59,7 @@ class GraspPlan:
         tap: touch first: tap on the top, or from the side touch the side that the hand comes from.
         only_touch: only touch, and do not close: tap on the top, or touch the side that a closing from there comes to.
         places: where it touches that side, one after another.
+        down_to_m: one finger alone touches the top, no lower than this, in the frame's origin.
         opening: one finger goes down into it, in the frame's origin, and touches floor and walls.
         may_shift: where a fingertip lands the hand may try again a little aside.
         may_rise: where only a link lands it may try again higher.
@@ -73,6 +74,7 @@ class GraspPlan:
     tap: bool = False
     only_touch: bool = False
     places: tuple[TouchPlace, ...] = ()
+    down_to_m: float | None = None
     opening: Opening | None = None
     may_shift: bool = True
     may_rise: bool = True

@@ -283,11 +283,20 @@ class FeltObject:
         return bool(self.distances_m(places_m).mean() > 2 * _NEAR_m)
 
     @property
+    def is_top_felt(self) -> bool:
+        """Whether a contact is on its top."""
+        return bool(self._on_top.any())
+
+    @property
     def top_place_m(self) -> Array:
         """Where its top was met, world x, y; the middle of the box where it was not."""
-        points_m, normals = self._points_m, self._normals
-        on_top = (normals[:, 2] > _UPWARD) & (points_m[:, 2] > (self.box.top_m or 0.0) - _NEAR_m)
-        return np.asarray(points_m[on_top, :2].mean(axis=0)) if on_top.any() else self.middle_m
+        on_top = self._on_top
+        return np.asarray(self._points_m[on_top, :2].mean(axis=0)) if on_top.any() else self.middle_m
+
+    @property
+    def _on_top(self) -> NDArray[np.bool_]:
+        """Which contacts face up close to its top, shape (n,)."""
+        return (self._normals[:, 2] > _UPWARD) & (self._points_m[:, 2] > (self.box.top_m or 0.0) - _NEAR_m)
 
     def in_words(self) -> str:
         """Its size, for people."""

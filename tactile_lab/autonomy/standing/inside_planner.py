@@ -19,8 +19,8 @@ from sessions.motion.grasp_plan import GraspPlan, Opening
 from sessions.motion.probing.touch_patterns import TAP, TAP_HEIGHT_m
 from tactile_lab.autonomy.standing.candidate import ActionPlanner, StandingCandidate
 
-_ROOM_m = 0.018
-"""From the middle of an opening to what is around it: a fingertip that leans, and the wall's thickness."""
+_ROOM_m = 0.022
+"""From the middle of an opening to what is around it: a fingertip, how far aside it goes down, and the wall."""
 
 _OVER_RIM_m, _OVER_TABLE_m = 0.005, 0.004
 """All else of the hand stays so far above the rim, and the fingertip above the table."""
@@ -44,7 +44,9 @@ class InsidePlanner(ActionPlanner):
 
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is open, or none would tell anything new."""
-        if len(self.blocked) >= _TRIES or (found := self.felt.opening()) is None or found[1] < _ROOM_m:
+        if FINGER not in self.hand.form.fingers or len(self.blocked) >= _TRIES:
+            return None
+        if (found := self.felt.opening()) is None or found[1] < _ROOM_m:
             return None
         rated = [one for one in self._candidates(*found) if self.reach.holds(one.plan, self.hand)]
         best = max(rated, key=lambda one: one.score_m, default=None)

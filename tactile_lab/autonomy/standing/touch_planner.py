@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from drivers.core.contacts import Array
 from drivers.shadow.closing.closing import SIDES, closing, sideways
+from drivers.shadow.closing.finger_down import FINGER
 from sessions.motion.cycle_settings import TouchSettings
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, TouchPlace
@@ -27,6 +28,9 @@ from tactile_lab.autonomy.standing.storeys import Storeys
 _TAPS_APART_m, _LANES_APART_m, _HEIGHTS_APART_m = 0.015, 0.025, 0.025
 _INSIDE_m = 0.008
 """From the edges of a face to the places where it is touched."""
+
+_WHOLE_TOP = 3.0
+"""A contact on a top that nothing has felt is worth as much as so many: it tells how tall the object is."""
 
 _TAP_TURNS_rad = np.radians([0.0, 30.0, -30.0, 60.0, -60.0])
 """Of a tap, from the middle of the arm's range."""
@@ -66,7 +70,9 @@ class TouchPlanner(ActionPlanner):
 
     def best(self) -> StandingCandidate | None:
         """The next touch; None where nothing is left that would tell anything new."""
-        best_first = sorted((*self._taps(), *self._sides()), key=lambda one: one.score_m, reverse=True)
+        best_first = sorted(
+            (*self._taps(), *self._sides(), *self._one_finger()), key=lambda one: one.score_m, reverse=True
+        )
         return next((one for one in best_first if self._is_news(one) and self._is_open(one)), None)
 
     def _is_news(self, one: StandingCandidate) -> bool:
@@ -113,6 +119,19 @@ class TouchPlanner(ActionPlanner):
             touches = {finger: place for finger, place, is_met in tips if is_met}
             plan = self._plan(frames[row], TAP.closing, TAP_HEIGHT_m, "tap on the top", len(touches))
             yield StandingCandidate(plan, touches, float(known_m[row][met[row]].sum()), on_top=True)
+
+    def _one_finger(self) -> Iterator[StandingCandidate]:
+        """One finger on the middle of a top that nothing has felt, small perhaps: all above it is open until then."""
+        if self.felt.is_top_felt or FINGER not in self.hand.form.fingers:
+            return
+        box, (low, high) = self.felt.storeys.boxes[-1], self.yaw_window_rad
+        place_m = np.array([[box.x_m, box.y_m, box.size_m[2]]])
+        known_m = self.felt.distances_m(place_m, on_top=True)
+        if self.felt.is_new(known_m).any():
+            frame = GraspFrame(box.x_m, box.y_m, (low + high) / 2)
+            plan = self._plan(frame, TAP.closing, TAP_HEIGHT_m, "one finger on the top", 1)
+            plan = replace(plan, down_to_m=max(self.settings.lowest_m, box.size_m[2] - self.settings.below_top_m))
+            yield StandingCandidate(plan, {FINGER: place_m[0]}, _WHOLE_TOP * float(known_m.sum()), on_top=True)
 
     def _tapping_tips(self) -> tuple[Sequence[str], Array]:
         """The fingers of a tap, and where their tips are in the grasp frame, shape (3, fingers)."""

@@ -9,6 +9,7 @@ from gtsam import Pose2
 from drivers.core.contacts import Array
 from drivers.shadow.closing.finger_down import LEANS_rad, finger_down
 from drivers.shadow.closing.posture import HandShape
+from drivers.shadow.model.hand_form import HandForm
 from sessions.motion.probing.bounding_box import BoundingBox
 from tactile_lab.autonomy.standing.candidate import SideReach, StandingCandidate
 from tactile_lab.autonomy.standing.felt_object import FeltObject
@@ -109,3 +110,8 @@ def test_after_two_blocked_tries_no_other_is_made() -> None:
         assert best is not None
         plans.blocked.append(best)
     assert plans.best() is None
+
+
+def test_a_hand_without_its_first_finger_does_not_reach_in() -> None:
+    form = HandForm(driven=tuple(name for name in HAND.form.driven if not name.startswith("FF")))
+    assert InsidePlanner(cup(), HandShape(form=form), WINDOW_rad, SideReach()).best() is None

@@ -297,3 +297,22 @@ def test_an_object_reaches_as_far_as_fingertips_have_landed_on_it() -> None:
     known.on_landings([np.array([0.05, -0.045, 0.07]), np.array([-0.05, 0.05, 0.07])])
     np.testing.assert_allclose(known.standing_box.size_m, [0.10, 0.095, 0.06])
     assert known.is_wide
+
+
+def test_one_finger_comes_down_on_a_small_top_that_nothing_has_felt_and_only_once() -> None:
+    known = felt(0.03, 0.03, 0.13)
+    touches = planner(known)
+    assert not list(touches._taps())
+    best = touches.best()
+    assert best is not None
+    assert best.plan.down_to_m == pytest.approx(0.10)
+    np.testing.assert_allclose(best.touches_m, [[*known.middle_m, 0.13]])
+    known.on_looked(best.touches_m, on_top=True)
+    assert not list(touches._one_finger())
+
+
+def test_a_top_that_was_felt_is_touched_by_no_finger_alone() -> None:
+    known = felt(0.03, 0.03, 0.13)
+    known.on_grasp(contacts(np.array([[0.01, 0.004, 0.129]]), (0.1, 0.0, 0.99)))
+    assert known.is_top_felt
+    assert not list(planner(known)._one_finger())

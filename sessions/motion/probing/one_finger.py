@@ -1,6 +1,10 @@
-"""Touches inside what is open from above: one finger goes down between its walls, to its floor and against them."""
+"""Touches with one finger that hangs down: a small top, and the inside of what is open from above, where it goes down
+between the walls, to the floor and against them.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,8 +23,8 @@ _OFF_FLOOR_m, _STOREY_m, _WALLS = 0.008, 0.025, 2
 _BEHIND_WALL_m = 0.015
 """A wall is looked for so far beyond where it is expected."""
 
-_OVER_RIM_m = 0.004
-"""From there on the finger goes down slowly."""
+_BELOW_TOP_m = 0.003
+"""What is met from there on is a slope or a rim, on which links land."""
 
 _BELOW_RIM_m = 0.010
 """Higher up a fingertip meets the rim."""
@@ -31,8 +35,19 @@ _SUNK_m = 0.002
 _DOWN = np.array([0.0, 0.0, -1.0])
 
 
-class InsideToucher(Toucher):
-    """Touches the inside of an object, too."""
+class OneFingerToucher(Toucher):
+    """Touches with one finger, too."""
+
+    def touch_top(self, frame: GraspFrame, deepest_m: float) -> None:
+        """Come down on a top that has no room for more fingers.
+
+        Args:
+            frame: the finger goes down in its origin.
+            deepest_m: no lower than that.
+        """
+        posture = finger_down(LEANS_rad[0], self._hand)
+        self._lower_finger(frame, top_at_most_m(self._motion), deepest_m, posture)
+        self._go_up(frame, posture)
 
     def touch_inside(self, frame: GraspFrame, opening: Opening) -> None:
         """Go down in an opening until the floor is met, if it is no deeper than the finger gets, then against the wall
@@ -49,19 +64,33 @@ class InsideToucher(Toucher):
 
     def _reach_in(self, frame: GraspFrame, opening: Opening, posture: FingerDown) -> None:
         """Down, and against one wall; up at once where a link has met something."""
-        motion, cycle, table = self._motion, self._cycle, posture.table
-        above = motion.base_joints(frame, table, top_at_most_m(motion) + cycle.clearance_m)
-        near = motion.base_joints(frame, table, opening.rim_m + _OVER_RIM_m)
-        lowest = motion.base_joints(frame, table, opening.deepest_m)
+        if self._lower_finger(frame, opening.rim_m, opening.deepest_m, posture):
+            self._touch_walls(frame, opening, posture)
+        self._go_up(frame, posture)
+
+    def _lower_finger(self, frame: GraspFrame, top_m: float, deepest_m: float, posture: FingerDown) -> bool:
+        """Over an object, and down as in a tap: the slower the nearer, below its top as slowly as where links may land.
+        Returns whether the finger may go on.
+        """
+        motion, cycle, s = self._motion, self._cycle, self.settings
+        above = self._above(frame, posture)
         motion.climb(above, cycle.travel_m_s)
-        motion.blend_fingers(table, _held(posture).progress, cycle.finger_rad_s)
+        motion.blend_fingers(posture.table, _held(posture).progress, cycle.finger_rad_s)
         motion.move_base(motion.unwound(above), *self._travel)
         motion.tare(cycle.rest_s)
-        if not self._approach(near, cycle.descent_m_s) and self._goes_to(
-            lowest, cycle.links_landing_m_s, posture, frame
-        ):
-            self._touch_walls(frame, opening, posture)
-        motion.climb(above, cycle.travel_m_s)
+        heights_m = [max(deepest_m, height_m) for height_m in (top_m + s.near_m, top_m - _BELOW_TOP_m, deepest_m)]
+        goals = [motion.base_joints(frame, posture.table, height_m) for height_m in heights_m]
+        return self._go(
+            list(zip(goals, (cycle.descent_m_s, s.tap_m_s, cycle.links_landing_m_s), strict=True)), posture, frame
+        )
+
+    def _go_up(self, frame: GraspFrame, posture: FingerDown) -> None:
+        self._motion.climb(self._above(frame, posture), self._cycle.travel_m_s)
+
+    def _above(self, frame: GraspFrame, posture: FingerDown) -> Array:
+        """Where the hand may travel, the fingertip over the frame's origin."""
+        above_m = top_at_most_m(self._motion) + self._cycle.clearance_m
+        return self._motion.base_joints(frame, posture.table, above_m)
 
     def _touch_walls(self, frame: GraspFrame, opening: Opening, posture: FingerDown) -> None:
         """The wall that the finger leans to, at some heights from the lowest that it got to."""
@@ -74,19 +103,19 @@ class InsideToucher(Toucher):
             middle = motion.base_joints(frame, posture.table, height_m)
             motion.move_base(middle, *self._travel)
             goal = motion.base_joints(there, posture.table, height_m)
-            is_free = self._goes_to(goal, self.settings.side_m_s, posture, frame, along)
+            is_free = self._go([(goal, self.settings.side_m_s)], posture, frame, along)
             motion.move_base(middle, *self._travel)
             if not is_free:
                 return
 
-    def _goes_to(
-        self, goal: Array, speed_m_s: float, posture: FingerDown, frame: GraspFrame, along: Array = _DOWN
+    def _go(
+        self, ways: Sequence[tuple[Array, float]], posture: FingerDown, frame: GraspFrame, along: Array = _DOWN
     ) -> bool:
-        """Toward a goal until something is met, and the fingertip against it along a direction in the grasp frame.
-        Returns whether the finger may go on: no link has met anything.
+        """To one goal after another, each at a speed of its own, until something is met, and the fingertip against it
+        along a direction in the grasp frame. Returns whether the finger may go on: no link has met anything.
         """
         self._motion.runtime.begin_closing()
-        met = self._approach(goal, speed_m_s)
+        met = any(self._approach(goal, speed_m_s) for goal, speed_m_s in ways)
         if (is_free := LINKS not in self.guard.met) and met:
             table, held = posture.table, _held(posture)
             self._lay_on(table, held, along, frame, self.settings.alone_N, _SUNK_m, up_to_m=0.0)
