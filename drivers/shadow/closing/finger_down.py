@@ -6,6 +6,7 @@ mm above the fingertip. The finger leans a little, so that its tip meets a wall 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -21,6 +22,7 @@ from drivers.shadow.closing.posture import NODES, HandShape, moved_joints, palm_
 from drivers.shadow.model.kinematics import joint_vector, palm_T_distal_matrices
 
 FINGER = "FF"
+"""It is at the side of the hand: no other finger is between it and the thumb."""
 
 LEANS_rad = (float(np.deg2rad(13.0)), float(np.deg2rad(-13.0)))
 """Of the finger: its tip toward the grasp frame's +x axis, and toward -x, for which its knuckle turns by nearly 90
@@ -84,12 +86,19 @@ def finger_down(lean_rad: float, hand: HandShape) -> FingerDown:
     first = FINGERS.index(FINGER)
     lowest_m = centres_m[first] - [0.0, 0.0, np.linalg.norm(frames[first, 2, :3] * np.array(hand.semi_axes_m))]
     tips_m = {finger: centres_m[FINGERS.index(finger)] - lowest_m for finger in hand.form.fingers}
-    paths = {finger: TipPath(tip_m, tip_m, (0.0, 1.0)) for finger, tip_m in tips_m.items()}
-    table = Closing("finger-down", 0.0, hand.radius_m, Pose3(Rot3(palm), -lowest_m), paths, {}, form=hand.form)
-    moved = {finger: moved_joints(finger, hand.form) for finger in hand.form.fingers}
-    rows = {finger: np.array([angles_rad[joint] for joint in joints]) for finger, joints in moved.items()}
-    table = replace(table, tables={finger: np.tile(row, (NODES, 1)) for finger, row in rows.items()})
+    table = _still(Pose3(Rot3(palm), -lowest_m), tips_m, angles_rad, hand)
     return FingerDown(table, np.array([np.sign(lean_rad), 0.0, 0.0]), tips_m[FINGER], *_all_else(table, tips_m))
+
+
+def _still(
+    grasp_T_palm: Pose3, tips_m: Mapping[str, Array], angles_rad: Mapping[str, float], hand: HandShape
+) -> Closing:
+    """A closing on which every finger stays where it is."""
+    paths, tables = dict[str, TipPath](), dict[str, Array]()
+    for finger, tip_m in tips_m.items():
+        paths[finger] = TipPath(tip_m, tip_m, (0.0, 1.0))
+        tables[finger] = np.tile([angles_rad[joint] for joint in moved_joints(finger, hand.form)], (NODES, 1))
+    return Closing("finger-down", 0.0, hand.radius_m, grasp_T_palm, paths, tables, form=hand.form)
 
 
 def _angles_rad(lean_rad: float, hand: HandShape) -> dict[str, float]:
@@ -104,7 +113,7 @@ def _angle_rad(joint: str, lean_rad: float) -> float:
     return _OTHERS_rad.get(joint, 0.0 if joint.startswith("TH") else _OTHERS_rad.get(joint[2:], 0.0))
 
 
-def _all_else(table: Closing, tips_m: dict[str, Array]) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _all_else(table: Closing, tips_m: Mapping[str, Array]) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Balls that stand for all but the first fingertip, their radii, and which are the first finger's links."""
     links, (palm_m, palm_radii_m) = balls_of(table), palm_and_forearm(table)
     others_m = np.array([tip_m for finger, tip_m in tips_m.items() if finger != FINGER])

@@ -79,10 +79,9 @@ class OneFingerToucher(Toucher):
         motion.move_base(motion.unwound(above), *self._travel)
         motion.tare(cycle.rest_s)
         heights_m = [max(deepest_m, height_m) for height_m in (top_m + s.near_m, top_m - _BELOW_TOP_m, deepest_m)]
+        speeds_m_s = (cycle.descent_m_s, s.tap_m_s, cycle.links_landing_m_s)
         goals = [motion.base_joints(frame, posture.table, height_m) for height_m in heights_m]
-        return self._go(
-            list(zip(goals, (cycle.descent_m_s, s.tap_m_s, cycle.links_landing_m_s), strict=True)), posture, frame
-        )
+        return self._go(list(zip(goals, speeds_m_s, strict=True)), posture, frame)
 
     def _go_up(self, frame: GraspFrame, posture: FingerDown) -> None:
         self._motion.climb(self._above(frame, posture), self._cycle.travel_m_s)
