@@ -8,13 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from gtsam import Pose2
 from numpy.typing import NDArray
-from scipy.spatial.distance import cdist
 
 from drivers.core.contacts import ApproachPath, Array, Grasp
 from sessions.conductor.object_gone import OPENING_m
 from sessions.motion.probing.bounding_box import BoundingBox
 from sessions.motion.probing.box_fit import fit_box, on_sides
-from tactile_lab.autonomy.standing.openings import Openings
+from tactile_lab.autonomy.standing.openings import Openings, nowhere, to_nearest_m
 from tactile_lab.autonomy.standing.roundness import is_round
 from tactile_lab.autonomy.standing.side_clearance import StandingBox
 from tactile_lab.autonomy.standing.storeys import Storeys, storeys_of
@@ -48,10 +47,6 @@ _ASSUMED_m = 0.030
 """From the middle to a side of which nothing is known."""
 
 
-def _nowhere() -> Array:
-    return np.empty((0, 3))
-
-
 @dataclass
 class FeltObject:
     """One object on the table.
@@ -64,11 +59,11 @@ class FeltObject:
 
     box: BoundingBox
     grasps: int = 0
-    _points_m: Array = field(default_factory=_nowhere)
-    _normals: Array = field(default_factory=_nowhere)
+    _points_m: Array = field(default_factory=nowhere)
+    _normals: Array = field(default_factory=nowhere)
     """Of all contacts, as their places: shape (n, 3), world frame."""
 
-    _looked_m: dict[bool, Array] = field(default_factory=lambda: {True: _nowhere(), False: _nowhere()})
+    _looked_m: dict[bool, Array] = field(default_factory=lambda: {True: nowhere(), False: nowhere()})
     """Places on the top, and on sides."""
 
     openings: Openings = field(default_factory=Openings)
@@ -148,7 +143,7 @@ class FeltObject:
             points_m, normals: shape (n, 3) each, world frame.
             motion: world frame.
         """
-        self._points_m, self._normals, self._moved = _nowhere(), _nowhere(), self._first.move(motion)
+        self._points_m, self._normals, self._moved = nowhere(), nowhere(), self._first.move(motion)
         self.add(points_m, normals)
 
     def on_looked(self, places_m: Array, *, on_top: bool = False) -> None:
@@ -159,7 +154,7 @@ class FeltObject:
 
     def look_again(self) -> None:
         """Places on top and sides where contacts were expected and found elsewhere, or nowhere, are new again."""
-        self._looked_m = {True: _nowhere(), False: _nowhere()}
+        self._looked_m = {True: nowhere(), False: nowhere()}
 
     def on_pushed(self, way: Array) -> None:
         """It was touched from one side alone along a horizontal unit vector, world, shape (2,)."""
@@ -168,7 +163,7 @@ class FeltObject:
 
     def on_missed_top(self, places_m: Array) -> None:
         """Fingertips of a tap were expected at these places, (n, 3), world: those far from all contacts met nothing."""
-        self.openings.on_missed(places_m, self._apart_m(places_m, self._points_m))
+        self.openings.on_missed(places_m, to_nearest_m(places_m, self._points_m))
 
     def on_passed(self, paths: Sequence[ApproachPath]) -> None:
         """Fingertips that came to touch a side have gone these ways."""
@@ -220,18 +215,11 @@ class FeltObject:
         """
         points_m, normals = self._points_m, self._normals
         facing = normals[:, 2] > _NO_SIDE if on_top else normals[:, 2] < _UPWARD
-        return np.minimum(self._apart_m(places_m, np.vstack([points_m[facing], self._looked_m[on_top]])), _FAR_m)
-
-    @staticmethod
-    def _apart_m(places_m: Array, others_m: Array) -> Array:
-        """Of places (n, 3) to the nearest of others (m, 3), shape (n,); infinite where there is none."""
-        if len(others_m) == 0:
-            return np.full(len(places_m), np.inf)
-        return np.asarray(cdist(places_m, others_m).min(axis=1))
+        return np.minimum(to_nearest_m(places_m, np.vstack([points_m[facing], self._looked_m[on_top]])), _FAR_m)
 
     def are_open(self, places_m: Array) -> NDArray[np.bool_]:
         """Whether a tap has met nothing near places of the top, (n, 3), and nearer than any contact is, shape (n,)."""
-        return self.openings.are_open(places_m, self._apart_m(places_m, self._points_m))
+        return self.openings.are_open(places_m, to_nearest_m(places_m, self._points_m))
 
     def opening(self) -> tuple[Array, float] | None:
         """The middle of what is open from above, world x, y, and how far from it the nearest contact is, if any."""

@@ -23,17 +23,23 @@ _ALIKE = 0.3
 """Least cosine between normals of what faces alike."""
 
 
-def _nowhere() -> Array:
+def nowhere() -> Array:
+    """No places, shape (0, 3)."""
     return np.empty((0, 3))
+
+
+def to_nearest_m(places_m: Array, others_m: Array) -> Array:
+    """Of places (n, 3) to the nearest of others (m, 3), shape (n,); infinite where there is none."""
+    return np.asarray(cdist(places_m, others_m).min(axis=1, initial=np.inf))
 
 
 @dataclass
 class Openings:
     """Openings of one object."""
 
-    _missed_m: Array = field(default_factory=_nowhere)
-    _looked_m: Array = field(default_factory=_nowhere)
-    _looked_normals: Array = field(default_factory=_nowhere)
+    _missed_m: Array = field(default_factory=nowhere)
+    _looked_m: Array = field(default_factory=nowhere)
+    _looked_normals: Array = field(default_factory=nowhere)
     """Where contacts were expected inside, and outward normals there."""
 
     def on_missed(self, places_m: Array, apart_m: Array) -> None:
@@ -54,8 +60,7 @@ class Openings:
             places_m: see above.
             apart_m: from there to the nearest contact, shape (n,).
         """
-        missed_m = cdist(places_m, self._missed_m).min(axis=1, initial=np.inf)
-        return np.asarray(missed_m < np.minimum(_OPEN_m, apart_m))
+        return np.asarray(to_nearest_m(places_m, self._missed_m) < np.minimum(_OPEN_m, apart_m))
 
     def widest(self, around_m: Array) -> tuple[Array, float] | None:
         """The middle of what is open, world x, y, and how far from it the nearest contact is; None where no tap has
