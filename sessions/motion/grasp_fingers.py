@@ -101,12 +101,13 @@ class GraspFingers:
     def ease(self, touching: frozenset[str], from_N: float) -> None:
         """Press less and less, all fingers together, while the object is still felt.
 
-        The fingers open at different speeds and leave one after the other: the last ones then push the object.
+        The fingers open at different speeds and leave one after the other: the last ones then push the object. And a
+        tip that the others hold too hard is not pressed harder still by one that holds less than it should.
         """
         s = self.settings
         for share in self._motion.shares(s.ease_s):
             force_N = from_N + share * (s.ease_force_N - from_N)
-            self.servo_forces(self.balanced_forces_N(touching, force_N))
+            self.servo_forces(self.balanced_forces_N(touching, force_N), hard_N=s.closing_most_N)
             self._motion.tick()
 
     def balanced_forces_N(self, touching: frozenset[str], force_N: float) -> dict[str, float]:
@@ -124,7 +125,7 @@ class GraspFingers:
             self.servo_forces(targets_N)
             self._motion.tick()
 
-    def servo_forces(self, targets_N: dict[str, float], slack: float = 0.0) -> None:
+    def servo_forces(self, targets_N: dict[str, float], slack: float = 0.0, hard_N: float = np.inf) -> None:
         """One cycle of force control: a fingertip moves along its path in proportion to its force error.
 
         It retreats faster than it presses. A fingertip that is held up presses no further, and none does while another
@@ -133,9 +134,10 @@ class GraspFingers:
         Args:
             targets_N: by finger.
             slack: a force that is off by no more than this share of its target is right.
+            hard_N: more than this is hard, if it is less than usual.
         """
         s, table, loads_N = self.settings, self.table, self._motion.loads_N()
-        pressed, held_up = self.pressed(s.pressed_N), self._motion.bent(s.held_up_rad)
+        pressed, held_up = self.pressed(min(s.pressed_N, hard_N)), self._motion.bent(s.held_up_rad)
         errors_N = dict.fromkeys((*pressed, *held_up), -_HASTE_N)
         for finger, target_N in targets_N.items():
             most_N = 0.0 if pressed or finger in held_up else _HASTE_N
