@@ -95,9 +95,13 @@ Execute: TypeAlias = Callable[[Sequence[Cell], Work], Iterator[Row]]
 
 
 def execute(cell: Cell, work: Work) -> Row:
-    """Run one cell; any error becomes the result of this run, and the others continue."""
+    """Run one cell; any error becomes the result of this run, and the others continue. So does a figure that no file of
+    results can hold, as infinity.
+    """
     try:
-        return Row(cell, work(cell))
+        figures = work(cell)
+        json.dumps(figures, allow_nan=False)
+        return Row(cell, figures)
     except TactileLabError as error:
         return Row(cell, None, str(error))
     except Exception as error:  # a defect appears in the table as a failed run with its name

@@ -20,7 +20,7 @@ from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 KNOWN_m = 0.005
 """A place of the surface is known where the model is no farther from it, and says that it is not."""
 
-NOTHING_KNOWN: dict[str, Any] = {"known_share": 0.0, "reach_hausdorff_mm": np.inf}
+NOTHING_KNOWN: dict[str, Any] = {"known_share": 0.0, "reach_hausdorff_mm": None}
 
 _PLACES, _PLACES_OF_MODEL = 1_000, 5_000
 """Places that are looked at: the share is right to 0.02."""

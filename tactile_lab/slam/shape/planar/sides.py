@@ -120,6 +120,11 @@ def divide_into_sides(contacts: PlanarContacts, order: Indices) -> list[Side]:
     return second if second_cost < first_cost else first
 
 
+def divide_along(contacts: PlanarContacts, order: Indices) -> list[Side]:
+    """The cheapest division of contacts in their order along a line that is not closed."""
+    return _divide_opened(contacts, order)[1]
+
+
 def _divide_opened(contacts: PlanarContacts, order: Indices) -> tuple[float, list[Side]]:
     runs = _Runs(contacts, order)
     straight, bent = runs.fit(is_round=False), runs.fit(is_round=True)

@@ -1,4 +1,4 @@
-"""Turns a section through a vertical axis into the surface of a solid of revolution."""
+"""Sections of solids of revolution: what is known of their foot, and the surface that they sweep."""
 
 from __future__ import annotations
 
@@ -6,12 +6,23 @@ import numpy as np
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
+from tactile_lab.slam.shape.fields.floating import UPRIGHT_SINE
+from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.solids.axis import SIDEWAYS
 from tactile_lab.slam.shape.solids.mesh import FacetMesh, Indices
 from tactile_lab.slam.shape.surfaces.surface import Contour
 
 _ON_AXIS_m = 1e-9
 _SHARP_rad = 0.5
 _LEAST_SECTIONS, _LEAST_STEPS = 12, 4
+_FOOT_SHARE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, 0.2, 0.006
+"""As for the standing field: how much of the height is mirrored at the table, and how far inward its walls move."""
+_WIDENS, _LOWEST = 0.6, 5
+"""By how much at most a foot widens as it goes down, and so many contacts tell where, and whether they lean more."""
+_DEPTHS, _BEYOND_m = 6, np.arange(0.004, 0.08, 0.004)
+"""Of places beside the foot: how many one below the other, and how far out."""
+_SURE_SIGMAS = 2.0
+"""Walls continue below the table at their own inclination only if it differs from upright by this many sigmas."""
 
 
 def generatrix(section: Contour, floor_m: float, step_m: float) -> tuple[Array, Array]:
@@ -101,3 +112,77 @@ def _resample(rows: Array, step_m: float) -> Array:
     wanted = np.linspace(0.0, along[-1], max(_LEAST_STEPS, int(np.ceil(along[-1] / step_m))) + 1)
     wanted = np.unique(np.concatenate([wanted, corners]))
     return np.column_stack([np.interp(wanted, along, column) for column in rows.T])
+
+
+def both_halves(half: Gpis, floor_m: float | None) -> Gpis:
+    """The field of the section on both sides of the axis, its foot continued below the table if there is one."""
+    seen = half.observations
+    rows = np.column_stack([half.contacts_m, half.normals, seen.value_sigma_m, seen.gradient_sigma])
+    right = rows if floor_m is None else np.vstack([rows, *_below_table(rows, floor_m)])
+    both = np.vstack([right, right * [-1, 1, -1, 1, 1, 1]])
+    return half.refit(both[:, :2], both[:, 2:4], both[:, 4], both[:, 5], half.noise_scale)
+
+
+def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:
+    """Virtual contacts that continue walls and bottom below the table, and walls again where they meet it.
+
+    Walls continue at their inclination, slightly inward, as those of the standing field. What faces up is mirrored, as
+    the inside of a cup's bottom, which would have no thickness otherwise.
+
+    Args:
+        rows: of each contact place, normal and their two standard deviations, shape (n, 6).
+        floor_m: height of the table.
+
+    Returns:
+        Rows of the same kind. Where walls meet the table they are together as uncertain as a wall is that leans by
+        :data:`_INSET_SLOPE` between its contacts and there.
+    """
+    above_m = rows[:, 1] - floor_m
+    feet = np.flatnonzero((rows[:, 3] > -UPRIGHT_SINE) & (above_m < _FOOT_SHARE * above_m.max()))
+    near, above_m = rows[feet], above_m[feet]
+    is_wall = near[:, 3] < UPRIGHT_SINE
+    overhang = _overhang(near[is_wall, 2:4], near[is_wall, 5]) * is_wall
+    inset_m = np.minimum(_INSET_SLOPE * np.abs(above_m), _LARGEST_INSET_m) * is_wall
+    below = near.copy()
+    below[:, :2] = (near[:, :2] - inset_m[:, None] * near[:, 2:4]) * [1, -1] + [0, 2 * floor_m]
+    below[:, 0] -= 2 * overhang * above_m
+    below[:, 3] = -near[:, 3] - 2 * overhang * np.sign(near[:, 2])
+    below[:, 2:4] = _unit(below[:, 2:4])
+    at_table = (near + below)[is_wall] / 2
+    at_table[:, 2:4] = _unit(at_table[:, 2:4])
+    vague = _INSET_SLOPE * np.sqrt(max(len(at_table), 1))
+    at_table[:, 4:] = np.hypot(at_table[:, 4:], vague * np.column_stack([above_m[is_wall], np.ones(len(at_table))]))
+    return below, at_table
+
+
+def beside_foot(half: Gpis, floor_m: float) -> Array:
+    """Places between the lowest contacts of outer walls and the table that a foot does not reach, shape (q, 2).
+
+    Below them a wall goes outward by no more than a share of how far it goes down, or as it leans. A field alone may
+    spread out over the table, where it is its own mirror image.
+    """
+    walls = np.flatnonzero(half.normals[:, 0] > SIDEWAYS)
+    lowest = walls[np.argsort(half.contacts_m[walls, 1])[:_LOWEST]]
+    if len(lowest) == 0:
+        return np.empty((0, 2))
+    lean = half.normals[lowest].mean(axis=0)
+    (edge_m, _), low_m = half.contacts_m[lowest].max(axis=0), half.contacts_m[lowest, 1].min()
+    depths_m = np.linspace(0.0, max(low_m - floor_m, 0.0), _DEPTHS)
+    down_m, beyond_m = (each.ravel() for each in np.meshgrid(depths_m, _BEYOND_m))
+    return np.column_stack([edge_m + max(_WIDENS, lean[1] / lean[0]) * down_m + beyond_m, low_m - down_m])
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+
+
+def _overhang(walls: Array, sigma_rad: Array) -> float:
+    """Sine of the angle by which outer walls with these normals, shape (n, 2), face the table; zero if they may be
+    upright or stand on a wider foot.
+    """
+    outer = walls[:, 0] > SIDEWAYS
+    if not outer.any():
+        return 0.0
+    weights = sigma_rad[outer] ** -2
+    down = -float(np.average(walls[outer, 1], weights=weights))
+    return down if down > _SURE_SIGMAS / np.sqrt(weights.sum()) else 0.0

@@ -8,7 +8,7 @@ along the normals meet, improved by the evidence of the profile.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
@@ -18,16 +18,18 @@ from scipy.optimize import minimize
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
-from tactile_lab.slam.shape.fields.floating import UPRIGHT_SINE, standing
+from tactile_lab.slam.shape.fields.floating import standing
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.shape.fields.settings import GpisSettings
-from tactile_lab.slam.shape.solids.axis import SIDEWAYS, LARGEST_GAP_rad, find_axis, misfit_around, split, to_profile
+from tactile_lab.slam.shape.planar.segmentation import PlanarContacts
+from tactile_lab.slam.shape.planar.sided_section import SidedSection
+from tactile_lab.slam.shape.solids.axis import LARGEST_GAP_rad, find_axis, misfit_around, split, to_profile
 from tactile_lab.slam.shape.solids.mesh import area_weighted_normals
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
-from tactile_lab.slam.shape.solids.revolving import generatrix, revolve
+from tactile_lab.slam.shape.solids.revolving import beside_foot, both_halves, generatrix, revolve
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour
 
 _LARGEST_MISFIT = 2.0
@@ -40,14 +42,6 @@ _AXIS_STEP_m, _AXIS_TOLERANCE_m, _EVIDENCE_TOLERANCE, _AXIS_TRIES = 0.0005, 2e-5
 _KERNEL_STEPS = 20
 _SECTION_GRID_m = 0.001
 _SPACING = 1.5
-_FOOT_SHARE, _INSET_SLOPE, _LARGEST_INSET_m = 0.35, 0.2, 0.006
-"""As for the standing field: how much of the height is mirrored at the table, and how far inward its walls move."""
-_WIDENS, _LOWEST = 0.6, 5
-"""By how much at most a foot widens as it goes down, and so many contacts tell where, and whether they lean more."""
-_DEPTHS, _BEYOND_m = 6, np.arange(0.004, 0.08, 0.004)
-"""Of places beside the foot: how many one below the other, and how far out."""
-_SURE_SIGMAS = 2.0
-"""Walls continue below the table at their own inclination only if it differs from upright by this many sigmas."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +55,7 @@ class Turned:
         free_m: places known to be outside, in the same coordinates, shape (k, 2).
         floor_m: height of the table; None for an axis that does not stand on it.
         log_evidence: that of the profile and of normals in planes through the axis, minus the price of the axis.
+        sides: the profile as straight and round sides, if contacts are likelier with them than with a smooth one.
         name: "turned".
     """
 
@@ -70,6 +65,7 @@ class Turned:
     free_m: Array
     floor_m: float | None
     log_evidence: float
+    sides: SidedSection | None = None
     name: str = "turned"
 
     @classmethod
@@ -98,12 +94,31 @@ class Turned:
         price = 2 * np.log(_AXIS_RANGE_m / (np.sqrt(2 * np.pi) * sigma_m))
         evidence = half.log_marginal_likelihood() + misfit_around(contacts, axis_m)[1] - price
         free_m = np.empty((0, 3)) if free_points_m is None else np.reshape(free_points_m, (-1, 3))
-        return cls(axis_m, min(spread_m, sigma_m), half, to_profile(free_m, axis_m), floor_m, float(evidence))
+        smooth = cls(axis_m, min(spread_m, sigma_m), half, to_profile(free_m, axis_m), floor_m, float(evidence))
+        return smooth._or_sided()
+
+    def _or_sided(self) -> Self:
+        """The same with sides, if they exist and are likelier than the smooth profile."""
+        if self.floor_m is None:
+            return self
+        seen = self.half.observations
+        contacts = PlanarContacts.of(self.half.contacts_m, self.half.normals, seen.value_sigma_m, seen.gradient_sigma)
+        try:
+            line_m, _ = generatrix(self._smooth_section, self.floor_m, _SECTION_GRID_m)
+            sides = SidedSection.of(contacts, line_m, self.floor_m)
+        except ShapeError:  # the smooth profile remains
+            return self
+        gained = sides.log_evidence - self.half.log_marginal_likelihood()
+        return self if gained <= 0 else replace(self, sides=sides, log_evidence=self.log_evidence + gained)
+
+    @property
+    def _smooth_section(self) -> Contour:
+        return extract_contour(self.profile, resolution_m=_SECTION_GRID_m)
 
     @cached_property
     def profile(self) -> Gpis:
         """The field of the whole section through the axis, with all that is known of places without contacts."""
-        section = _both_halves(self.half, self.floor_m)
+        section = both_halves(self.half, self.floor_m)
         free_m = self.free_m
         if self.floor_m is not None:
             section = standing(section, self.floor_m)
@@ -133,7 +148,7 @@ class Turned:
         Raises:
             ShapeError: the profile encloses nothing.
         """
-        section = extract_contour(self.profile, resolution_m=_SECTION_GRID_m)
+        section = self._smooth_section if self.sides is None else self.sides.contour(_SECTION_GRID_m)
         step_m = _SPACING * resolution_m
         floor_m = self.floor_m if floor_m is None else floor_m
         line_m, sigma_m = generatrix(section, -np.inf if floor_m is None else floor_m, step_m)
@@ -217,77 +232,3 @@ def _seen_from(contacts: WeightedContacts, axis_m: Array) -> tuple[Array, Array,
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
     sigmas = contacts.point_weights**-0.5, contacts.normal_weights**-0.5
     return to_profile(contacts.points_m, axis_m), normals, *sigmas
-
-
-def _both_halves(half: Gpis, floor_m: float | None) -> Gpis:
-    """The field of the section on both sides of the axis, its foot continued below the table if there is one."""
-    seen = half.observations
-    rows = np.column_stack([half.contacts_m, half.normals, seen.value_sigma_m, seen.gradient_sigma])
-    right = rows if floor_m is None else np.vstack([rows, *_below_table(rows, floor_m)])
-    both = np.vstack([right, right * [-1, 1, -1, 1, 1, 1]])
-    return half.refit(both[:, :2], both[:, 2:4], both[:, 4], both[:, 5], half.noise_scale)
-
-
-def _below_table(rows: Array, floor_m: float) -> tuple[Array, Array]:
-    """Virtual contacts that continue walls and bottom below the table, and walls again where they meet it.
-
-    Walls continue at their inclination, slightly inward, as those of the standing field. What faces up is mirrored, as
-    the inside of a cup's bottom, which would have no thickness otherwise.
-
-    Args:
-        rows: of each contact place, normal and their two standard deviations, shape (n, 6).
-        floor_m: height of the table.
-
-    Returns:
-        Rows of the same kind. Where walls meet the table they are together as uncertain as a wall is that leans by
-        :data:`_INSET_SLOPE` between its contacts and there.
-    """
-    above_m = rows[:, 1] - floor_m
-    feet = np.flatnonzero((rows[:, 3] > -UPRIGHT_SINE) & (above_m < _FOOT_SHARE * above_m.max()))
-    near, above_m = rows[feet], above_m[feet]
-    is_wall = near[:, 3] < UPRIGHT_SINE
-    overhang = _overhang(near[is_wall, 2:4], near[is_wall, 5]) * is_wall
-    inset_m = np.minimum(_INSET_SLOPE * np.abs(above_m), _LARGEST_INSET_m) * is_wall
-    below = near.copy()
-    below[:, :2] = (near[:, :2] - inset_m[:, None] * near[:, 2:4]) * [1, -1] + [0, 2 * floor_m]
-    below[:, 0] -= 2 * overhang * above_m
-    below[:, 3] = -near[:, 3] - 2 * overhang * np.sign(near[:, 2])
-    below[:, 2:4] = _unit(below[:, 2:4])
-    at_table = (near + below)[is_wall] / 2
-    at_table[:, 2:4] = _unit(at_table[:, 2:4])
-    vague = _INSET_SLOPE * np.sqrt(max(len(at_table), 1))
-    at_table[:, 4:] = np.hypot(at_table[:, 4:], vague * np.column_stack([above_m[is_wall], np.ones(len(at_table))]))
-    return below, at_table
-
-
-def beside_foot(half: Gpis, floor_m: float) -> Array:
-    """Places between the lowest contacts of outer walls and the table that a foot does not reach, shape (q, 2).
-
-    Below them a wall goes outward by no more than a share of how far it goes down, or as it leans. A field alone may
-    spread out over the table, where it is its own mirror image.
-    """
-    walls = np.flatnonzero(half.normals[:, 0] > SIDEWAYS)
-    lowest = walls[np.argsort(half.contacts_m[walls, 1])[:_LOWEST]]
-    if len(lowest) == 0:
-        return np.empty((0, 2))
-    lean = half.normals[lowest].mean(axis=0)
-    (edge_m, _), low_m = half.contacts_m[lowest].max(axis=0), half.contacts_m[lowest, 1].min()
-    depths_m = np.linspace(0.0, max(low_m - floor_m, 0.0), _DEPTHS)
-    down_m, beyond_m = (each.ravel() for each in np.meshgrid(depths_m, _BEYOND_m))
-    return np.column_stack([edge_m + max(_WIDENS, lean[1] / lean[0]) * down_m + beyond_m, low_m - down_m])
-
-
-def _unit(vectors: Array) -> Array:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
-
-
-def _overhang(walls: Array, sigma_rad: Array) -> float:
-    """Sine of the angle by which outer walls with these normals, shape (n, 2), face the table; zero if they may be
-    upright or stand on a wider foot.
-    """
-    outer = walls[:, 0] > SIDEWAYS
-    if not outer.any():
-        return 0.0
-    weights = sigma_rad[outer] ** -2
-    down = -float(np.average(walls[outer, 1], weights=weights))
-    return down if down > _SURE_SIGMAS / np.sqrt(weights.sum()) else 0.0

@@ -71,6 +71,19 @@ def test_an_experiment_that_was_broken_off_goes_on_where_it_stopped(tmp_path: Pa
     assert [row.figures for row in rows] == [square(cell) for cell in CELLS]
 
 
+@pytest.mark.parametrize("figure", [float("inf"), float("nan"), {"deep": [float("inf")]}])
+def test_a_figure_that_no_file_holds_costs_its_run_alone(figure: object, tmp_path: Path) -> None:
+    file = tmp_path / "runs.jsonl"
+
+    def infinite_once(cell: Cell) -> dict[str, object]:
+        return {"value": figure} if cell == CELLS[1] else dict(square(cell))
+
+    rows = run_cells("test", CELLS[:3], infinite_once, file)
+    assert [row.figures is None for row in rows] == [False, True, False]
+    assert "JSON" in rows[1].problem
+    assert run_cells("test", CELLS[:3], Counting(failing=(3, 4)), file) == rows
+
+
 def test_a_line_that_was_being_written_when_the_program_died_is_run_again(tmp_path: Path) -> None:
     file, second = tmp_path / "runs.jsonl", Counting()
     run_cells("test", CELLS[:3], square, file)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 import trimesh
@@ -50,4 +52,6 @@ def test_a_dent_counts_in_the_top_and_not_in_the_underside(side: float, off_mm: 
 
 
 def test_nothing_is_known_without_a_model() -> None:
-    assert reach_figures(None, box()) == NOTHING_KNOWN
+    found = reach_figures(None, box())
+    assert found == NOTHING_KNOWN
+    json.dumps(found, allow_nan=False)

@@ -151,7 +151,7 @@ def test_a_bowl_whose_rim_leans_inward_is_hollow_though_its_model_has_a_dent() -
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     field = Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad).optimise(max_iterations=10)
     free_m = np.array([[0.0, 0.0, 0.04], [0.01, 0.0, 0.035], [-0.01, 0.01, 0.04]])
-    dented = Turned.fit(field, 0.0)
+    dented = replace(Turned.fit(field, 0.0), sides=None)
     middle = dented.mesh().vertices
     assert middle[np.hypot(*middle[:, :2].T) < 0.01, 2].max() < 0.035
     assert isinstance(hollowed(dented, field, free_m, 0.0), Hollow)

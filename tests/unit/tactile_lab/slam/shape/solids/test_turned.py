@@ -13,8 +13,8 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
 from tactile_lab.slam.shape.metrics.metrics import mesh_errors
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
-from tactile_lab.slam.shape.solids.revolving import generatrix, revolve
-from tactile_lab.slam.shape.solids.turned import Turned, beside_foot
+from tactile_lab.slam.shape.solids.revolving import beside_foot, generatrix, revolve
+from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.surfaces.surface import Contour
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
 from tests.support.solid_examples import box_mesh, contacts_on, field_on
