@@ -43,6 +43,7 @@ _UPWARD, _NO_SIDE = 0.7, 0.3
 _SURELY_m = 0.015
 """Contacts are few: an object is wider than the box around them."""
 
+_SAME_PLACE_m = 0.010
 _ASSUMED_m = 0.030
 """From the middle to a side of which nothing is known."""
 
@@ -216,6 +217,10 @@ class FeltObject:
         points_m, normals = self._points_m, self._normals
         facing = normals[:, 2] > _NO_SIDE if on_top else normals[:, 2] < _UPWARD
         return np.minimum(to_nearest_m(places_m, np.vstack([points_m[facing], self._looked_m[on_top]])), _FAR_m)
+
+    def was_touched(self, place_m: Array) -> bool:
+        """Whether a contact was at a place, shape (3,), world, or as near as two taps on one place are."""
+        return bool((np.linalg.norm(self._points_m - place_m, axis=1) < _SAME_PLACE_m).any())
 
     def are_open(self, places_m: Array) -> NDArray[np.bool_]:
         """Whether a tap has met nothing near places of the top, (n, 3), and nearer than any contact is, shape (n,)."""

@@ -102,8 +102,11 @@ class Whereabouts:
         return change
 
     def _change(self, box: BoundingBox) -> Change:
-        was = self.felt.box
-        if abs((box.top_m or 0.0) - (was.top_m or 0.0)) > max(_FALLEN_m, 0.1 * (was.top_m or 0.0)):
+        """What was touched before at the same place and height stands there: a tap beside a rim slips into a bowl."""
+        was, top_m = self.felt.box, box.top_m or 0.0
+        if not box.has_sides and self.felt.was_touched(np.append(box.centre_world_m, top_m)):
+            return Change.STANDS
+        if abs(top_m - (was.top_m or 0.0)) > max(_FALLEN_m, 0.1 * (was.top_m or 0.0)):
             return Change.FELL
         if not box.has_sides or np.linalg.norm(box.centre_world_m - was.centre_world_m) < _MOVED_m:
             return Change.STANDS
