@@ -13,7 +13,7 @@ from drivers.shadow.closing.posture import HandShape
 from sessions.motion.arrival import Arrival, Place
 from sessions.motion.carry_guard import CarryGuard, cycles_evenly_along
 from sessions.motion.cycle_settings import CycleSettings
-from sessions.motion.grasp_fingers import CLEAR_m, GraspFingers
+from sessions.motion.grasp_fingers import GraspFingers
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan, TouchPlace, evade
 from sessions.motion.holding import HoldingForces
@@ -294,7 +294,7 @@ class GraspCycle:
         )
         lift = Weigher(self._motion, self.settings.weighing, grip).weigh(self.plan.frame, self._table())
         if lift.end is LiftEnd.ABOVE:
-            self._motion.rise(CLEAR_m, self.settings.travel_m_s)
+            self.fingers.rise()
         if lift.end.is_held:
             self.fingers.ease(touching, self.settings.weighing.squeeze_N)
         self._motion.runtime.end_hold()

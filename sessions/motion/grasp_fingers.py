@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from drivers.shadow.closing.closing import Closing
@@ -14,7 +16,10 @@ _HASTE_N, _FLIGHT_N = 1.0, 3.0
 """Limits of the force error in force control: toward the object, and away from it."""
 
 CLEAR_m = 0.02
-"""So far the hand rises where a fingertip is over an object that it has lost."""
+"""So far the hand rises where a fingertip is over the object."""
+
+_RESISTED_N = 1.0
+"""A fingertip that is pressed so much more than before the hand moved is in the object's way, and not held by it."""
 
 
 class GraspFingers:
@@ -158,15 +163,18 @@ class GraspFingers:
 
     def _overloaded_fingers(self) -> set[str]:
         """The fingers whose tips are pressed hard, or that are held up."""
-        return {*self.pressed(self.settings.pressed_N), *self._motion.bent(self.settings.held_up_rad)}
+        return {*self.pressed(self.settings.pressed_N), *self._held_up()}
+
+    def _held_up(self) -> set[str]:
+        return set(self._motion.bent(self.settings.held_up_rad))
 
     def release(self) -> None:
         """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Overloaded fingers are released first, the others wait for them, unless they are in their way. A finger that
-        felt nothing before and is pressed as it opens is over the object that it has lost: the hand rises once.
+        Overloaded fingers are released first, the others wait for them, unless they are in their way. A finger that is
+        pressed as it opens is over the object, or in its way: the hand rises once, and that finger opens last.
         """
-        lost = set(self._fingers) - set(self.pressed(self.settings.touch_force_N))
+        begun_N, begun_bent, has_risen = self._motion.loads_N(), self._held_up(), False
         table, closed, opened = self.table, self.progress, _open(self.table)
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
         shares = dict.fromkeys(self._fingers, 0.0)
@@ -175,16 +183,28 @@ class GraspFingers:
             return closed[finger] + min(1.0, share) * (opened[finger] - closed[finger])
 
         while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
-            if lost & set(self.pressed(self.settings.closing_most_N)):
-                self._motion.rise(CLEAR_m, self.settings.travel_m_s)
-                lost = set()
-            urgent = closed_still & self._overloaded_fingers()
+            resisted = self._resisted(begun_N) | self._held_up() - begun_bent
+            if resisted and not has_risen:
+                self.rise()
+                has_risen = True
+            urgent = closed_still & self._overloaded_fingers() - resisted
             free = {finger for finger in closed_still if not self._nears(finger, place(finger, shares[finger] + step))}
-            for finger in urgent & free or free or closed_still:
+            for finger in urgent & free or free - resisted or free or closed_still:
                 shares[finger] = min(1.0, shares[finger] + step)
             self.progress = {finger: place(finger, shares[finger]) for finger in closed}
             self._motion.set_fingers(table, self.progress)
             self._motion.tick()
+
+    def rise(self) -> None:
+        """Up from over or beside the object, until it holds a fingertip back."""
+        begun_N = self._motion.loads_N()
+        up = self._motion.raised(CLEAR_m)
+        self._motion.probe_base(up, self.settings.approach_m_s, lambda: bool(self._resisted(begun_N)))
+
+    def _resisted(self, begun_N: Mapping[str, float]) -> set[str]:
+        """The fingertips that are pressed, and harder than they were."""
+        pressed, loads_N = self.pressed(self.settings.closing_most_N), self._motion.loads_N()
+        return {finger for finger in pressed if loads_N[finger] > begun_N.get(finger, 0.0) + _RESISTED_N}
 
 
 def _open(closing: Closing) -> dict[str, float]:

@@ -197,9 +197,13 @@ class Motion:
 
     def rise(self, height_m: float, speed_m_s: float) -> None:
         """Move straight up from the positioner's last target."""
+        self.move_base(self.raised(height_m), speed_m_s, np.inf)
+
+    def raised(self, height_m: float) -> Array:
+        """The positioner's last target, so much higher; shape (6,)."""
         q = self._base_q.copy()
         q[:3] += self.runtime.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, height_m]))
-        self.move_base(q, speed_m_s, np.inf)
+        return q
 
     def climb(self, q: Array, speed_m_s: float) -> None:
         """Straight up to the height of ``q``, shape (6,), if the positioner is lower: up, before it goes over."""

@@ -13,6 +13,7 @@ from drivers.shadow.closing.posture import HandShape
 from drivers.shadow.model.kinematics import JOINT_INDEX
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.grasp_cycle import GraspCycle
+from sessions.motion.grasp_fingers import CLEAR_m
 from sessions.motion.grasp_frame import GraspFrame
 from sessions.motion.grasp_plan import GraspPlan
 from sessions.motion.motion import Motion
@@ -190,21 +191,60 @@ def test_a_finger_that_stays_strained_does_not_keep_the_hand_closed(strain: Stra
     assert ways(strain.cycle) == pytest.approx(opened)
 
 
-@pytest.mark.parametrize(("felt_before_N", "risen_m"), [(-5.0, 0.02), (0.0, 0.0)])
-def test_a_hand_that_opens_rises_where_a_finger_that_had_lost_the_object_comes_upon_it(
-    strain: Strain, felt_before_N: float, risen_m: float
-) -> None:
+def while_it_opens(
+    strain: Strain, *, begun_N: float = 0.0, loads_N: float = 0.0, bent_rad: float = 0.0, until: int = 6
+) -> tuple[float, list[Mapping[str, float]]]:
+    """How far the hand rises if the thumb is pressed or held up from the third cycle on, and where fingers are then."""
     strain.grasp()
-    strain.extra_N, cycles = {"TH": felt_before_N}, list[float]()
+    strain.extra_N, steps = {"TH": begun_N}, list[Mapping[str, float]]()
 
     def watch(world: DiscWorld) -> None:
-        cycles.append(float(world.base_q[2]))
-        strain.extra_N = {"TH": 5.0} if 3 <= len(cycles) < 6 else {}
+        steps.append(ways(strain.cycle))
+        now = 3 <= len(steps) < until
+        strain.extra_N = {"TH": loads_N if now else begun_N}
+        strain.held_rad = {"THJ5": bent_rad} if now else {}
 
     before_m = float(strain.world.base_q[2])
     strain.world.before_cycle = watch
     strain.cycle.release()
-    assert abs(float(strain.world.base_q[2]) - before_m) == pytest.approx(risen_m, abs=1e-3)
+    return abs(float(strain.world.base_q[2]) - before_m), steps
+
+
+@pytest.mark.parametrize("begun_N", [-5.0, 0.0, 1.0])
+def test_a_hand_that_opens_rises_where_a_finger_comes_upon_the_object(strain: Strain, begun_N: float) -> None:
+    """Whether that finger had lost it or held it."""
+    assert while_it_opens(strain, begun_N=begun_N, loads_N=5.0)[0] == pytest.approx(CLEAR_m, abs=1e-3)
+
+
+def test_it_rises_where_a_link_is_held_up_as_it_opens(strain: Strain) -> None:
+    """The fingertip would dip into the table: nothing else gives way."""
+    assert while_it_opens(strain, bent_rad=0.3)[0] == pytest.approx(CLEAR_m, abs=1e-3)
+
+
+def test_it_stays_where_a_finger_is_pressed_no_harder_than_when_it_held(strain: Strain) -> None:
+    assert while_it_opens(strain, begun_N=4.5, loads_N=5.0, until=9_999)[0] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_it_rises_no_farther_than_a_fingertip_is_held_back(strain: Strain) -> None:
+    """A hook under an edge: the force grows with every cycle upward."""
+    strain.grasp()
+    begun_m = float(strain.world.base_q[2])
+
+    def watch(world: DiscWorld) -> None:
+        strain.extra_N = {"TH": 5.0 + 3_000.0 * abs(float(world.base_q[2]) - begun_m)}
+
+    strain.world.before_cycle = watch
+    strain.cycle.fingers.rise()
+    assert abs(float(strain.world.base_q[2]) - begun_m) < 0.001
+
+
+def test_a_finger_in_the_way_of_the_object_opens_last(strain: Strain) -> None:
+    _, steps = while_it_opens(strain, loads_N=5.0, until=9_999)
+    opened = {finger: strain.cycle._table().path(finger).valid[0] for finger in FINGERS}
+    waits = [step for step in steps[6:] if step["TH"] > opened["TH"] + 1e-6]
+    others = [max(step[finger] - opened[finger] for finger in FINGERS if finger != "TH") for step in waits]
+    assert others[-1] == pytest.approx(0.0, abs=1e-6)
+    assert ways(strain.cycle) == pytest.approx(opened)
 
 
 def test_a_strained_finger_opens_no_farther_than_its_neighbour_leaves_room(strain: Strain) -> None:
@@ -212,6 +252,7 @@ def test_a_strained_finger_opens_no_farther_than_its_neighbour_leaves_room(strai
     cycle, gaps_m = strain.cycle, list[float]()
     assert cycle.descend(GraspPlan(GraspFrame(0.0, 0.0, 0.3), "radial", 0.034))
     cycle.fingers.progress = dict.fromkeys(FINGERS, 0.97)
+    strain.world.disc = None
     strain.extra_N = {"MF": 20.0}
 
     def watch(world: DiscWorld) -> None:
