@@ -18,6 +18,9 @@ _HASTE_N, _FLIGHT_N = 1.0, 3.0
 CLEAR_m = 0.02
 """So far the hand rises where a fingertip is over the object."""
 
+_FOLLOWS_s = 0.25
+"""A finger that nothing holds has followed its target by then."""
+
 _RESISTED_N = 1.0
 """A fingertip that is pressed so much more than before the hand moved is in the object's way, and not held by it."""
 
@@ -171,25 +174,32 @@ class GraspFingers:
     def release(self) -> None:
         """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Overloaded fingers are released first, the others wait for them, unless they are in their way. A finger that is
-        pressed as it opens is over the object, or in its way: the hand rises once, and that finger opens last.
+        Overloaded fingers are released first, the others wait for them, unless they are in their way. One that falls
+        behind its target waits until it has followed: where joints are unlike late, its tip dips. A finger that is
+        pressed as it opens, or does not follow, is over the object or in its way: the hand rises once, and that finger
+        opens last.
         """
         begun_N, begun_bent, has_risen = self._motion.loads_N(), self._held_up(), False
         table, closed, opened = self.table, self.progress, _open(self.table)
         step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
-        shares = dict.fromkeys(self._fingers, 0.0)
+        shares, behind = dict.fromkeys(self._fingers, 0.0), dict.fromkeys(self._fingers, 0)
+        patience = self._motion.cycles(_FOLLOWS_s)
 
         def place(finger: str, share: float) -> float:
             return closed[finger] + min(1.0, share) * (opened[finger] - closed[finger])
 
         while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
-            resisted = self._resisted(begun_N) | self._held_up() - begun_bent
+            late = self._held_up() - begun_bent
+            behind = {finger: behind[finger] + 1 if finger in late else 0 for finger in behind}
+            waiting = {finger for finger in late if behind[finger] <= patience}
+            resisted = self._resisted(begun_N) | late - waiting
             if resisted and not has_risen:
                 self.rise()
                 has_risen = True
-            urgent = closed_still & self._overloaded_fingers() - resisted
+            urgent = closed_still & self._overloaded_fingers() - resisted - late
             free = {finger for finger in closed_still if not self._nears(finger, place(finger, shares[finger] + step))}
-            for finger in urgent & free or free - resisted or free or closed_still:
+            able = free - waiting
+            for finger in urgent & free or able - resisted or able or closed_still - waiting:
                 shares[finger] = min(1.0, shares[finger] + step)
             self.progress = {finger: place(finger, shares[finger]) for finger in closed}
             self._motion.set_fingers(table, self.progress)
