@@ -20,6 +20,10 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 
 DEPTH_m = 0.002
 """How far outside or inside a told place is, and how uncertain that is."""
+FREE_SIGMA_m, LARGEST_SHARE_FILLED = 0.003, 0.05
+"""How deep inside a model a place that a finger went through may be by noise, and the share of such places that may be
+deeper.
+"""
 _ROUNDS, _AT_ONCE, _LEAST_INSIDE_m = 4, 40, 0.0005
 _MOST_JOINTS = 6
 _RISE_m, _HIGHEST_m = 0.0005, 0.008

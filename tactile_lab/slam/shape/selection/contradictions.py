@@ -9,6 +9,7 @@ import numpy as np
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
+from tactile_lab.slam.shape.fields.known_places import LARGEST_SHARE_FILLED, FREE_SIGMA_m
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.unexplained import are_inside
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
@@ -24,10 +25,8 @@ LEFT_OUT_nats = 12.0
 LARGEST_SHARE_OFF = 0.15
 """Of the contacts, off the surface of a sharp solid."""
 
-_FREE_SIGMA_m = 0.003
 _ON_SURFACE_m = 0.006
 _NOISE_SIGMAS = 2.0
-_LARGEST_SHARE_FILLED = 0.05
 
 
 def checked_evidence(
@@ -52,7 +51,7 @@ def checked_evidence(
         return -np.inf
     away_m = distances_to_mesh(gpis.contacts_m, mesh)
     free = np.empty((0, 3)) if free_points_m is None or "contradictions" in gpis.settings.without else free_points_m
-    if np.mean(away_m > _ON_SURFACE_m) > largest_share_off or _filled_share(mesh, free) > _LARGEST_SHARE_FILLED:
+    if np.mean(away_m > _ON_SURFACE_m) > largest_share_off or _filled_share(mesh, free) > LARGEST_SHARE_FILLED:
         return -np.inf
     return shape.log_evidence - stray_cost(away_m, contacts_of(gpis).point_weights)
 
@@ -76,7 +75,7 @@ def _filled_share(mesh: SurfaceMesh, free_points_m: Array) -> float:
     inside = are_inside(free_points_m, mesh)
     if not inside.any():
         return 0.0
-    deep = distances_to_mesh(free_points_m[inside], mesh) > _FREE_SIGMA_m
+    deep = distances_to_mesh(free_points_m[inside], mesh) > FREE_SIGMA_m
     return float(deep.sum() / len(free_points_m))
 
 

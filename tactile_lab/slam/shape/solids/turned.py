@@ -20,9 +20,10 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.floating import standing
 from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.shape.fields.known_places import in_one_piece, outside_at
+from tactile_lab.slam.shape.fields.known_places import LARGEST_SHARE_FILLED, FREE_SIGMA_m, in_one_piece, outside_at
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.shape.fields.settings import GpisSettings
+from tactile_lab.slam.shape.planar.outlines import encloses
 from tactile_lab.slam.shape.planar.segmentation import PlanarContacts
 from tactile_lab.slam.shape.planar.sided_section import SidedSection
 from tactile_lab.slam.shape.solids.axis import LARGEST_GAP_rad, find_axis, misfit_around, split, to_profile
@@ -30,6 +31,7 @@ from tactile_lab.slam.shape.solids.mesh import area_weighted_normals
 from tactile_lab.slam.shape.solids.planes import WeightedContacts
 from tactile_lab.slam.shape.solids.polyhedron import contacts_of
 from tactile_lab.slam.shape.solids.revolving import beside_foot, both_halves, generatrix, revolve
+from tactile_lab.slam.shape.surfaces.sampling import distances_to_polygon
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh, extract_contour
 
 _LARGEST_MISFIT = 2.0
@@ -109,7 +111,19 @@ class Turned:
         except ShapeError:  # the smooth profile remains
             return self
         gained = sides.log_evidence - self.half.log_marginal_likelihood()
-        return self if gained <= 0 else replace(self, sides=sides, log_evidence=self.log_evidence + gained)
+        return (
+            self
+            if gained <= 0 or self._fills(sides)
+            else replace(self, sides=sides, log_evidence=self.log_evidence + gained)
+        )
+
+    def _fills(self, sides: SidedSection) -> bool:
+        """Whether sides enclose more than a few of the places that are known to be outside."""
+        if not len(self.free_m):
+            return False
+        outline_m = sides.contour(_SECTION_GRID_m).points_m
+        deep = encloses(outline_m, self.free_m) & (distances_to_polygon(self.free_m, outline_m) > FREE_SIGMA_m)
+        return float(deep.mean()) > LARGEST_SHARE_FILLED
 
     @property
     def _smooth_section(self) -> Contour:

@@ -95,3 +95,13 @@ def test_a_beaker_gets_sides_and_a_pear_keeps_its_smooth_profile() -> None:
     radii = 26 + 9 * np.cos(np.pi * heights / 80) + 3 * np.sin(heights / 9)
     pear = turned([0, *(radii * np.sqrt(np.clip(1 - (heights / 80) ** 8, 0, 1)))], [0, *heights])
     assert Turned.fit(field_on(pear, 140, seed=2), 0.0).sides is None
+
+
+def test_sides_that_fill_where_fingers_went_are_not_taken() -> None:
+    """Straight down to the table, where a finger went below the lowest contact."""
+    field = field_on(turned([0, 30, 45, 0], [0, 0, 80, 80]), 110, seed=2)
+    angles = np.linspace(0.0, 2 * np.pi, 12)
+    below_m = np.column_stack([0.022 * np.cos(angles), 0.022 * np.sin(angles), np.full(12, 0.012)])
+    assert Turned.fit(field, 0.0, below_m).sides is None
+    beside_m = below_m * [2.2, 2.2, 1.0]
+    assert Turned.fit(field, 0.0, beside_m).sides is not None
