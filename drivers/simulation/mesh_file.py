@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 
 from drivers.core.errors import ConfigurationError
 from drivers.core.reading.bounded_files import refuse_unreachable
@@ -22,6 +23,8 @@ MOST_TRIANGLES = 100_000
 """Finding how a finer mesh rests on the table takes minutes, and no fingertip feels the difference."""
 
 _UNITS_m = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
+_EVEN = [np.dot(order, [1, 3, 9]) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+"""Numbers of the orders of three corners that go round the same way."""
 _SPECK = 0.01
 """Of the largest body's volume: what is smaller is a flaw of the file."""
 
@@ -108,7 +111,8 @@ def _close(mesh: trimesh.Trimesh, where: str) -> tuple[str, ...]:
     if mesh.is_watertight and mesh.volume > 0:
         return ()
     mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    mesh.update_faces(mesh.nondegenerate_faces() & mesh.unique_faces())
+    mesh.update_faces(mesh.nondegenerate_faces())
+    mesh.update_faces(_without_walls_between(mesh.faces))
     holes = _open_edges(mesh)
     trimesh.repair.fill_holes(mesh)
     mesh.fix_normals()
@@ -116,6 +120,18 @@ def _close(mesh: trimesh.Trimesh, where: str) -> tuple[str, ...]:
         what = f"is not a closed surface: {open_edges} edges are open, and filling small holes did not close it"
         raise ConfigurationError(what, where=where, hint="Repair it in a mesh editor")
     return (f"small holes were closed: {holes} edges were open",) if holes else ()
+
+
+def _without_walls_between(faces: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which faces stay: of equal ones a single one, and none where two parts lie face to face."""
+    sorted_faces, first, group = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True)
+    ahead = (np.argsort(faces, axis=1) @ [[1], [3], [9]]).ravel()
+    is_even = np.isin(ahead, _EVEN)
+    turned = np.bincount(group.ravel(), np.where(is_even, 1, -1), len(sorted_faces))
+    alone = np.bincount(group.ravel(), minlength=len(sorted_faces)) == 1
+    stays = np.zeros(len(faces), dtype=bool)
+    stays[first[alone | (turned != 0)]] = True
+    return stays
 
 
 def _open_edges(mesh: trimesh.Trimesh) -> int:

@@ -86,6 +86,24 @@ def test_what_lies_inside_is_left_out_and_the_outside_stays_exact(is_hollow: boo
     assert found.changes == ("1 part inside it left out",)
 
 
+def test_parts_that_lie_face_to_face_become_one_surface(tmp_path: Path) -> None:
+    """Two copies of a face between them, one turned over, are no doubles of one face."""
+    thin_m = 0.0006
+    slices = [box((thin_m, 0.05, 0.04), (thin_m * place, 0.0, 0.0)) for place in range(6)]
+    for mirrored in slices[1::2]:
+        mirrored.vertices[:, 0] = 2 * mirrored.vertices[:, 0].mean() - mirrored.vertices[:, 0]
+        mirrored.invert()
+    body = read(tmp_path, *slices, box((0.03, 0.05, 0.04), (0.015 + 5.5 * thin_m, 0.0, 0.0))).mesh
+    assert body.is_watertight
+    assert body.volume == pytest.approx((0.03 + 6 * thin_m) * 0.05 * 0.04, rel=0.01)
+
+
+@pytest.mark.parametrize("times", [2, 3])
+def test_a_surface_that_was_exported_more_than_once_counts_once(times: int, tmp_path: Path) -> None:
+    body = read(tmp_path, *times * [BLOCK]).mesh
+    assert body.volume == pytest.approx(BLOCK.volume, rel=1e-6)
+
+
 def test_a_closed_hole_is_told(tmp_path: Path) -> None:
     mesh = BLOCK.copy()
     mesh.update_faces(np.arange(12) > 0)
