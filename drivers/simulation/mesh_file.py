@@ -23,8 +23,6 @@ MOST_TRIANGLES = 100_000
 """Finding how a finer mesh rests on the table takes minutes, and no fingertip feels the difference."""
 
 _UNITS_m = {"millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
-_EVEN = [np.dot(order, [1, 3, 9]) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
-"""Numbers of the orders of three corners that go round the same way."""
 _SPECK = 0.01
 """Of the largest body's volume: what is smaller is a flaw of the file."""
 
@@ -124,13 +122,12 @@ def _close(mesh: trimesh.Trimesh, where: str) -> tuple[str, ...]:
 
 def _without_walls_between(faces: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which faces stay: of equal ones a single one, and none where two parts lie face to face."""
-    sorted_faces, first, group = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True)
-    ahead = (np.argsort(faces, axis=1) @ [[1], [3], [9]]).ravel()
-    is_even = np.isin(ahead, _EVEN)
-    turned = np.bincount(group.ravel(), np.where(is_even, 1, -1), len(sorted_faces))
-    alone = np.bincount(group.ravel(), minlength=len(sorted_faces)) == 1
+    _, first, group = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_inverse=True)
+    a, b, c = faces.T
+    way_round = np.sign((b - a) * (c - b) * (c - a))
+    is_wall = (np.bincount(group.ravel()) > 1) & (np.bincount(group.ravel(), way_round) == 0)
     stays = np.zeros(len(faces), dtype=bool)
-    stays[first[alone | (turned != 0)]] = True
+    stays[first[~is_wall]] = True
     return stays
 
 

@@ -44,6 +44,7 @@ _SURELY_m = 0.015
 """Contacts are few: an object is wider than the box around them."""
 
 _SAME_PLACE_m = 0.010
+"""Two taps on one place meet it no farther apart."""
 _ASSUMED_m = 0.030
 """From the middle to a side of which nothing is known."""
 
@@ -220,7 +221,7 @@ class FeltObject:
 
     def was_touched(self, place_m: Array) -> bool:
         """Whether a contact was at a place, shape (3,), world, or as near as two taps on one place are."""
-        return bool((np.linalg.norm(self._points_m - place_m, axis=1) < _SAME_PLACE_m).any())
+        return bool(to_nearest_m(place_m[None], self._points_m)[0] < _SAME_PLACE_m)
 
     def are_open(self, places_m: Array) -> NDArray[np.bool_]:
         """Whether a tap has met nothing near places of the top, (n, 3), and nearer than any contact is, shape (n,)."""

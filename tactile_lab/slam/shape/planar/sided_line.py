@@ -126,7 +126,7 @@ def joint_between(before: Side, after: Side, contacts: PlanarContacts, per_m: fl
     if abs(turn) < _SMOOTH_TURN:
         return Joint(0.5 * (before.feet_m(middle[None])[0] + after.feet_m(middle[None])[0]))
     corner = _meeting(before, after, middle)
-    leaps = [(corner - ends[0]) @ along(before, ends[0]), (ends[1] - corner) @ along(after, ends[1])]
+    leaps = [(corner - ends[0]) @ _along(before, ends[0]), (ends[1] - corner) @ _along(after, ends[1])]
     slack_m = _SLACK_SIGMAS * float(contacts.point_sigma_m.max())
     if min(leaps) < -slack_m:
         raise ShapeError("two sides do not meet between their contacts", hint="More contacts there would help")
@@ -149,7 +149,7 @@ def _meeting(before: Side, after: Side, near_m: Array) -> Array:
     raise ShapeError("two sides do not meet", hint="More contacts near their ends would help")
 
 
-def along(side: Side, place_m: Array) -> Array:
+def _along(side: Side, place_m: Array) -> Array:
     """Unit vector along a side, counter-clockwise."""
     outward = side.gradients(place_m[None])[0]
     return np.asarray(np.array([-outward[1], outward[0]]) / np.linalg.norm(outward))

@@ -125,7 +125,7 @@ class Turned:
         deep = encloses(outline_m, self.free_m) & (distances_to_polygon(self.free_m, outline_m) > FREE_SIGMA_m)
         return float(deep.mean()) > LARGEST_SHARE_FILLED
 
-    @property
+    @cached_property
     def _smooth_section(self) -> Contour:
         return extract_contour(self.profile, resolution_m=_SECTION_GRID_m)
 
