@@ -15,7 +15,8 @@ Grasps that cannot be registered:
   contacts, because they could not be removed from its only map; joint hypotheses use them and remain revisable.
 
 Where an object has fallen over (:attr:`~drivers.core.contacts.Grasp.begins_anew`) the estimate begins anew, with a new
-object frame; grasps before that have no pose.
+object frame; grasps before that have no pose. Where more was known of it before, that is the result
+(:mod:`tactile_lab.slam.before_fall`).
 
 A session is lost when the last ``lost_after`` grasps are untracked, or more than half of all. A grasp that was
 untracked when it was taken and has a place by now does not count, nor does a touch without a grasp that met nothing.
@@ -35,6 +36,7 @@ from drivers.core.contacts import Array, Contact, Grasp
 from drivers.core.errors import TrackingError
 from drivers.core.observability import observability, planar_observability
 from drivers.core.one_thread import on_one_thread
+from tactile_lab.slam.before_fall import better_known
 from tactile_lab.slam.current_shape import CurrentShape
 from tactile_lab.slam.doubt.assessment import Assessment, assess
 from tactile_lab.slam.doubt.heights import side_heights_m
@@ -108,6 +110,7 @@ class TactileSlam:
 
         self._shape = CurrentShape(self._settings, self._settings.shape_model)
         self._has_ended = False
+        self._before_fall: SlamResult | None = None
 
     @property
     def settings(self) -> SlamSettings:
@@ -163,7 +166,7 @@ class TactileSlam:
         told = self._assess(shape)
         trajectory = self._trajectory
         covariances, common = trajectory.covariances_with(told.alternatives)
-        return SlamResult(
+        result = SlamResult(
             method=self._settings.method,
             seed=self._seed,
             dimension=self._settings.dimension,
@@ -181,6 +184,7 @@ class TactileSlam:
             alternatives=told.alternatives,
             common_covariances=common,
         )
+        return better_known(self._before_fall, result)
 
     @property
     def world_T_object(self) -> Pose3 | None:
@@ -281,6 +285,8 @@ class TactileSlam:
         return self._log.is_lost(self._tracker)
 
     def _begin_anew(self) -> None:
+        if self._tracker is not None:
+            self._before_fall, self._has_ended = self.finish(), False
         self._tracker, self._origin_height_m, self._waiting = None, 0.0, ()
         self._heights_m = np.empty(0)
         self._shape = CurrentShape(self._settings, self._settings.shape_model)

@@ -207,9 +207,12 @@ def registered_mm(seen: SeenObject, dimension: int) -> float | None:
 
 
 def _as_it_lies(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) -> SeenObject:
-    """The object as it stands or, after a fall, lies: its mesh upright there, and the grasps from then on."""
+    """The object as it stood or, after a fall, lay when the model was made: its mesh upright there, and these grasps."""
     count = min(len(result.world_T_object), len(watch.truth), len(grasps))
-    begun = max([0, *(place for place, grasp in enumerate(grasps[:count]) if grasp.begins_anew)])
+    falls = [0, *(place for place, grasp in enumerate(grasps[:count]) if grasp.begins_anew)]
+    last = max((place for place, pose in enumerate(result.world_T_object[:count]) if pose is not None), default=count)
+    begun = max(place for place in falls if place <= last)
+    count = min((place for place in falls if place > begun), default=count)
     lying = spatial(planar(watch.truth[begun])).inverse() * watch.truth[begun] if begun else Pose3()
     mesh = trimesh.Trimesh(transform_points(lying, watch.mesh.vertices), watch.mesh.faces, process=False)
     truth = [pose * lying.inverse() for pose in watch.truth[begun:count]]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from drivers.core.contacts import Array
 from tactile_lab.slam.doubt.halves import exchanged
 from tactile_lab.slam.doubt.heights import many_heights
-from tactile_lab.slam.doubt.known_part import REACH_ALONE_m, REACH_m, known_part, with_guesses_told
+from tactile_lab.slam.doubt.known_part import known_part, reach_for, with_guesses_told
 from tactile_lab.slam.doubt.missing_parts import missing_parts
 from tactile_lab.slam.doubt.rivals import alternatives, costs_above, doubts_of, turned_by_symmetry
 from tactile_lab.slam.doubt.signs import signs
@@ -84,7 +84,7 @@ def assess(
     if shape is not None:
         stands = settings.freedom == "table"
         floor_m = -origin_height_m if stands else None
-        reach_m = REACH_m if sum(grasp.used for grasp in contact_map.placed) >= LEAST_GRASPS else REACH_ALONE_m
+        reach_m = reach_for(shape, sum(grasp.used for grasp in contact_map.placed))
         part = known_part(shape, contact_map.contacts, floor_m, contact_map.free_points_m, reach_m=reach_m)
         if isinstance(shape, SurfaceMesh):
             missing = [*missing_parts(contact_map, shape, floor_m), *doubts_of_top(shape, part.unfelt)]

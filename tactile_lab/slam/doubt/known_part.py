@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from drivers.core.contacts import Array
+from tactile_lab.slam.doubt.status import LEAST_GRASPS
 from tactile_lab.slam.doubt.unfelt_top import unfelt_top
 from tactile_lab.slam.shape.selection.unexplained import are_inside
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
@@ -33,13 +34,16 @@ spout, a handle or a corner is hardly wider than the places left between. Forty 
 mm know nine tenths of it.
 """
 
+_HAND_SIZED_m = 0.150
+"""Longest side of what that was measured on; features of larger objects are larger, and farther from each other."""
+
 LARGEST_GUESS_m = 0.040
 """No guess is more uncertain than this."""
 
 _CONTRADICTED_m, _DEEP_m = 0.010, 0.005
 """A finger went through so deep inside the model: so far around the nearest place of its surface that is not known."""
 
-REACH_ALONE_m = 0.010
+_REACH_ALONE_m = 0.010
 """The same of one grasp or two, whose contacts hardly confirm each other: a corner may be between any two of them."""
 
 LARGEST_ANGLE_rad = float(np.deg2rad(60.0))
@@ -108,6 +112,19 @@ def known_part(
     known, near = (near & (shape.sigma_m <= LARGEST_SIGMA_m)) | foot, near | foot
     share = float(sides.sizes @ known / max(float(sides.sizes.sum()), 1e-12))
     return KnownPart(near, known, min(share, 1.0), distances_m, unfelt)
+
+
+def reach_for(shape: Contour | SurfaceMesh, grasps: int) -> float:
+    """How far from a contact a shape is known, in metres.
+
+    Args:
+        shape: the outline or surface.
+        grasps: number of them that it is made of.
+    """
+    if grasps < LEAST_GRASPS:
+        return _REACH_ALONE_m
+    points_m = shape.points_m if isinstance(shape, Contour) else shape.vertices
+    return min(REACH_m * max(1.0, float(np.ptp(points_m, axis=0).max()) / _HAND_SIZED_m), LARGEST_GUESS_m)
 
 
 def with_guesses_told(shape: _Shape, part: KnownPart) -> _Shape:

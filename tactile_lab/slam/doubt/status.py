@@ -30,6 +30,7 @@ DoubtName: TypeAlias = Literal[
     "unknown-size",
     "missing-part",
     "unfelt-top",
+    "fell",
     "rivals",
     "many-heights",
     "symmetry",

@@ -1,7 +1,8 @@
 """A solid and parts beside it, such as a handle or a spout, which its model cannot have.
 
 Contacts near one another make up a part: a smooth field of their own, told where fingers went through, and joined to
-the solid where it is nearest, since an object is one piece.
+the solid where it is nearest, since an object is one piece. A part whose sides show how wide it is is taken for a bar,
+no thicker than wide, with an opening behind it, until it was felt there: handles are more common than fins.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from scipy.cluster.hierarchy import fcluster, linkage
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.shape.fields.known_places import inside_at, outside_at
+from tactile_lab.slam.shape.fields.known_places import DEPTH_m, inside_at, outside_at
 from tactile_lab.slam.shape.fields.posterior import Prediction
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.solids.solid_field import SolidField
@@ -30,6 +31,10 @@ _KERNEL_STEPS, _LARGEST_LENGTH_m = 20, 0.080
 _FINGERTIP_m = 0.006
 """Smallest thickness of a fingertip: what is this far outside of a contact is free."""
 _PLACES, _STEP_m, _DEPTH_m = 40, 0.006, 0.003
+_TO_A_SIDE, _AWAY = 0.35, 0.5
+"""Cosines from which on a contact of a bar tells how wide it is, and lies on the side away from the body."""
+_BAR_m, _BAR_SIGMA_m, _ROUND_SIGMA_m, _RADII_m = 0.006, 0.004, 0.0015, (0.003, 0.040)
+"""Radius of a bar before contacts tell it, its standard deviation, how far bars are from round, and all radii."""
 _GRID_m = 0.003
 """Walls of cups are hardly thicker."""
 
@@ -96,7 +101,7 @@ class WithParts:
         """Body and parts, each joined to the body."""
         mesh = self.body.mesh(_GRID_m, self.floor_m)
         body = SolidField(mesh, mesh.sigma_m)
-        return Union(body, _places(mesh), tuple(_joined(part, body) for part in self.parts))
+        return Union(body, _places(mesh), tuple(_joined(_opened(part, body), body) for part in self.parts))
 
 
 @dataclass(frozen=True)
@@ -141,6 +146,41 @@ def _nearer(one: Prediction, other: Prediction) -> Prediction:
     if len(variance_m2):
         variance_m2 = np.where(closer, other.variance_m2, variance_m2)
     return Prediction(np.minimum(one.mean_m, other.mean_m), gradient, variance_m2)
+
+
+def _opened(part: Gpis, body: SolidField) -> Gpis:
+    """The part, if it is a bar of known width, with what is beside it and behind it outside, as far as the body."""
+    around = body.predict(part.contacts_m, gradient=True)
+    away = around.gradient.mean(axis=0) / max(float(np.linalg.norm(around.gradient.mean(axis=0))), 1e-9)
+    across = _across(part.contacts_m, away)
+    radius_m = _radius_m(part, across)
+    if radius_m is None:
+        return part
+    facing = np.flatnonzero(part.normals @ away > _AWAY)
+    middles_m = part.contacts_m[facing] - radius_m * part.normals[facing]
+    beside_m = radius_m + DEPTH_m
+    outside_m = [middles_m + beside_m * across, middles_m - beside_m * across]
+    for middle_m, gap_m in zip(middles_m, around.mean_m[facing], strict=True):
+        ways_m = np.arange(beside_m, gap_m - radius_m - _FINGERTIP_m, _STEP_m)
+        outside_m.append(middle_m - ways_m[:, None] * away)
+    return outside_at(part, np.vstack(outside_m))
+
+
+def _across(points_m: Array, away: Array) -> Array:
+    """Unit vector across a bar through points, and across the way to the body, shape (3,)."""
+    aside = points_m - points_m.mean(axis=0)
+    along = np.linalg.svd(aside - np.outer(aside @ away, away))[2][0]
+    return np.cross(away, along)
+
+
+def _radius_m(part: Gpis, across: Array) -> float | None:
+    """Of a round bar through the part's contacts; None unless both its sides were felt."""
+    facing = part.normals @ across
+    if facing.max() < _TO_A_SIDE or facing.min() > -_TO_A_SIDE:
+        return None
+    rows = np.vstack([np.column_stack([facing, np.ones(len(facing))]) / _ROUND_SIGMA_m, [1 / _BAR_SIGMA_m, 0.0]])
+    places = np.append(part.contacts_m @ across / _ROUND_SIGMA_m, _BAR_m / _BAR_SIGMA_m)
+    return float(np.clip(np.linalg.lstsq(rows, places, rcond=None)[0][0], *_RADII_m))
 
 
 def _joined(part: Gpis, body: SolidField) -> Gpis:
