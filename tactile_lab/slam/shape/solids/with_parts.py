@@ -13,6 +13,7 @@ from typing import Self
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial import cKDTree
 
 from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
@@ -149,7 +150,9 @@ def _nearer(one: Prediction, other: Prediction) -> Prediction:
 
 
 def _opened(part: Gpis, body: SolidField) -> Gpis:
-    """The part, if it is a bar of known width, with what is beside it and behind it outside, as far as the body."""
+    """The part, if it is a bar of known width, with what is beside it outside, and what is behind it as far as the body
+    where no contact says otherwise.
+    """
     around = body.predict(part.contacts_m, gradient=True)
     away = around.gradient.mean(axis=0) / max(float(np.linalg.norm(around.gradient.mean(axis=0))), 1e-9)
     across = _across(part.contacts_m, away)
@@ -158,12 +161,14 @@ def _opened(part: Gpis, body: SolidField) -> Gpis:
         return part
     facing = np.flatnonzero(part.normals @ away > _AWAY)
     middles_m = part.contacts_m[facing] - radius_m * part.normals[facing]
-    beside_m = radius_m + DEPTH_m
-    outside_m = [middles_m + beside_m * across, middles_m - beside_m * across]
-    for middle_m, gap_m in zip(middles_m, around.mean_m[facing], strict=True):
-        ways_m = np.arange(beside_m, gap_m - radius_m - _FINGERTIP_m, _STEP_m)
-        outside_m.append(middle_m - ways_m[:, None] * away)
-    return outside_at(part, np.vstack(outside_m))
+    beside_m = (radius_m + DEPTH_m) * across
+    behind_m = [
+        middle_m - np.arange(radius_m + DEPTH_m, gap_m - radius_m - _FINGERTIP_m, _STEP_m)[:, None] * away
+        for middle_m, gap_m in zip(middles_m, around.mean_m[facing], strict=True)
+    ]
+    open_m = np.vstack([np.empty((0, 3)), *behind_m])
+    open_m = open_m[cKDTree(part.contacts_m).query(open_m)[0] > radius_m + _FINGERTIP_m / 2]
+    return outside_at(part, np.vstack([middles_m + beside_m, middles_m - beside_m, open_m]))
 
 
 def _across(points_m: Array, away: Array) -> Array:

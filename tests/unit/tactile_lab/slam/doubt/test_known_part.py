@@ -11,7 +11,7 @@ import trimesh
 from drivers.core.contacts import Array
 from tactile_lab.experiments.data.household import turned
 from tactile_lab.experiments.data.outlines import OUTLINES_m
-from tactile_lab.slam.doubt.known_part import LARGEST_GUESS_m, known_part, with_guesses_told
+from tactile_lab.slam.doubt.known_part import LARGEST_GUESS_m, known_part, reach_for, with_guesses_told
 from tactile_lab.slam.shape.surfaces.sampling import sample_polygon
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tactile_lab.slam.tracking.contacts.contact_set import ContactSet
@@ -48,6 +48,15 @@ def test_the_tip_of_a_wedge_is_known_from_both_its_faces() -> None:
     contacts = ContactSet(points, normals, np.full(2, 0.001), np.full(2, 0.087))
     part = known_part(Contour(wedge, np.full(len(wedge), 0.001), is_closed=True), contacts)
     assert part.known[np.linalg.norm(wedge, axis=1).argmin()]
+
+
+@pytest.mark.parametrize(
+    ("longest_m", "grasps", "reach_m"),
+    [(0.09, 8, 0.025), (0.15, 3, 0.025), (0.18, 8, 0.030), (0.40, 8, LARGEST_GUESS_m), (0.40, 2, 0.010)],
+)
+def test_large_objects_are_known_farther_from_contacts(longest_m: float, grasps: int, reach_m: float) -> None:
+    large = Contour(SQUARE_m * [longest_m / 0.09, 1.0], np.full(len(SQUARE_m), 0.001), is_closed=True)
+    assert reach_for(large, grasps) == pytest.approx(reach_m)
 
 
 def test_nothing_is_known_without_contacts_or_where_the_shape_is_uncertain() -> None:

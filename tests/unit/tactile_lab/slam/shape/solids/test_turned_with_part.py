@@ -13,6 +13,7 @@ from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
+from tactile_lab.slam.shape.solids.with_parts import WithParts
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
 from tests.support.solid_examples import box_mesh, contacts_on, field_on
@@ -61,6 +62,24 @@ def test_the_part_is_told_from_the_body_and_both_are_one_closed_surface() -> Non
 def distances_among(wanted_m: Array, found_m: Array) -> Array:
     """Of each place to the nearest that was found."""
     return np.asarray(np.linalg.norm(wanted_m[:, None] - found_m, axis=-1).min(axis=1))
+
+
+def test_a_fin_felt_on_its_sides_is_solid() -> None:
+    shape = turned_with_parts(felt(seed=3)[0], 0.0)
+    middles_m = AXIS_m + np.column_stack([np.linspace(0.040, 0.060, 6), np.zeros(6), np.full(6, 0.05)])
+    assert shape.union.predict(middles_m).mean_m.max() < 0.0
+
+
+def test_a_handle_felt_on_its_outer_side_is_a_bar_with_an_opening_behind() -> None:
+    body = contacts_on(turned([0, 36, 36, 0], [0, 0, 90, 90]), 60, 5)
+    turns, heights_m = np.tile(np.radians([-50.0, 0.0, 50.0]), 4), np.repeat([0.030, 0.042, 0.054, 0.066], 3)
+    normals = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(12)])
+    bar_m = np.column_stack([np.full(12, 0.066), np.zeros(12), heights_m]) + 0.006 * normals
+    points_m, facing = np.vstack([body[0], bar_m]), np.vstack([body[1], normals])
+    field = Gpis.fit(points_m, facing, POINT_SIGMA_m, NORMAL_SIGMA_rad)
+    shape = WithParts.of(Turned.fit(field.of_some(np.arange(60)), 0.0), field, np.arange(72) >= 60, 0.0)
+    places_m = np.array([[0.066, 0.0, 0.048], [0.052, 0.0, 0.048], [0.066, 0.012, 0.048], [0.066, -0.012, 0.048]])
+    assert (shape.union.predict(places_m).mean_m > 0.0).tolist() == [False, True, True, True]
 
 
 @pytest.mark.long
