@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from drivers.core.contacts import Array
+from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.contradictions import checked_evidence, try_make
 from tactile_lab.slam.shape.solids.lying import Lying
 from tactile_lab.slam.shape.solids.turned import Turned
-from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
+from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts, turned_without_strays
 
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_OFF_WITH_PART = 0.01, 0.05
 
@@ -23,6 +24,8 @@ def revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_lea
     if "turned" in without:
         return None
     body: FittedShape | None = _turned(gpis, free_points_m, floor_m, at_least=at_least)
+    if body is None and "strays" not in without:
+        body = _turned_but_for_strays(gpis, free_points_m, floor_m, at_least=at_least)
     most = at_least if body is None or body.log_evidence is None else body.log_evidence
     lying = _lying(gpis, free_points_m, floor_m, at_least=most)
     body, most = (body, most) if lying is None else (lying, lying.log_evidence)
@@ -42,6 +45,19 @@ def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least
         return None
     off = _LARGEST_SHARE_OFF
     evidence = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if evidence > at_least else None
+
+
+def _turned_but_for_strays(
+    gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float
+) -> Turned | None:
+    """The solid of revolution that a few wrong contacts hide, as :func:`_turned`: a field bulges at each of them."""
+    try:
+        shape, rest = turned_without_strays(gpis, floor_m, free_points_m)
+    except ShapeError:  # no axis, or too many contacts beside it
+        return None
+    off, others = _LARGEST_SHARE_OFF, gpis.of_some(rest)
+    evidence = checked_evidence(shape, others, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
     return shape if evidence > at_least else None
 
 

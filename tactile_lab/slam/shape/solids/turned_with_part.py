@@ -6,6 +6,8 @@ Contacts are divided into those of the body, which turns about an axis, and thos
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from drivers.core.contacts import Array
@@ -27,7 +29,7 @@ _STEEPEST = 1.0
 _ON_BODY_m, _OFF_BODY_m = 0.003, 0.005
 _LEFT_OUT_nats = 12.0
 """A contact of the body that costs more than one outlier among twenty good contacts is one of the part."""
-_LARGEST_SHARE, _LEAST_CONTACTS = 0.35, 2
+_LARGEST_SHARE, _LEAST_CONTACTS, _LARGEST_SHARE_OF_STRAYS = 0.35, 2, 0.1
 
 
 def turned_with_parts(gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> WithParts:
@@ -41,18 +43,40 @@ def turned_with_parts(gpis: Gpis, floor_m: float, free_points_m: Array | None = 
     Raises:
         ShapeError: there is no axis, nothing lies beside a body, or so much that it is no body.
     """
+    body, beside = _body(gpis, floor_m, free_points_m, (_LEAST_CONTACTS, _LARGEST_SHARE))
+    return WithParts.of(body, gpis, beside, floor_m, free_points_m)
+
+
+def turned_without_strays(gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> tuple[Turned, Indices]:
+    """Fit a body to all contacts but a few that lie beside it, each at the price of an outlier; and which are left.
+
+    Arguments and errors as of :func:`turned_with_parts`.
+    """
+    body, strays = _body(gpis, floor_m, free_points_m, (0, _LARGEST_SHARE_OF_STRAYS))
+    left_out = _least_costs(contacts_of(gpis), np.flatnonzero(strays)) + 2 * np.log(2 * np.pi) + _LEFT_OUT_nats
+    return replace(body, log_evidence=body.log_evidence - float(left_out.sum())), np.flatnonzero(~strays)
+
+
+def _body(
+    gpis: Gpis, floor_m: float, free_points_m: Array | None, limits: tuple[int, float]
+) -> tuple[Turned, Mask]:
+    """A body, and the contacts beside it, at least so many and at most such a share.
+
+    Raises:
+        ShapeError: there is no axis, or fewer contacts or more lie beside it.
+    """
     contacts = contacts_of(gpis)
-    beside = _check(_beside(contacts))
+    beside = _check(_beside(contacts), *limits)
     body = Turned.fit(gpis.of_some(np.flatnonzero(~beside)), floor_m, free_points_m)
-    divided = _check(_divide(contacts, beside, body))
+    divided = _check(_divide(contacts, beside, body), *limits)
     if (divided != beside).any():
         body = Turned.fit(gpis.of_some(np.flatnonzero(~divided)), floor_m, free_points_m)
-    return WithParts.of(body, gpis, divided, floor_m, free_points_m)
+    return body, divided
 
 
-def _check(beside: Mask) -> Mask:
+def _check(beside: Mask, least: int, largest_share: float) -> Mask:
     count = np.count_nonzero(beside)
-    if not _LEAST_CONTACTS <= count <= _LARGEST_SHARE * len(beside):
+    if not least <= count <= largest_share * len(beside):
         raise ShapeError(f"{count} of {len(beside)} contacts lie beside a solid of revolution")
     return beside
 
@@ -98,7 +122,9 @@ def _divide(contacts: WeightedContacts, beside: Mask, body: Turned) -> Mask:
 def _is_on(contacts: WeightedContacts, body: Turned) -> Mask:
     found = body.predict(contacts.points_m)
     slope = found.gradient / np.maximum(np.linalg.norm(found.gradient, axis=1, keepdims=True), 1e-9)
-    return np.asarray((np.abs(found.mean_m) < _ON_BODY_m) & (np.sum(slope * contacts.normals, axis=1) > 0.5))
+    meets = squares_around(contacts, body.axis_m)[0] <= _PASSES_BY
+    faces_out = np.sum(slope * contacts.normals, axis=1) > 0.5
+    return np.asarray(meets & faces_out & (np.abs(found.mean_m) < _ON_BODY_m))
 
 
 def _least_costs(contacts: WeightedContacts, members: Indices) -> Array:

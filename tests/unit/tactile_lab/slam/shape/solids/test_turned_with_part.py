@@ -12,7 +12,7 @@ from tactile_lab.experiments.data.household import HOUSEHOLD, turned
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.turned import Turned
-from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
+from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts, turned_without_strays
 from tactile_lab.slam.shape.solids.with_parts import WithParts
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
@@ -80,6 +80,18 @@ def test_a_handle_felt_on_its_outer_side_is_a_bar_with_an_opening_behind() -> No
     shape = WithParts.of(Turned.fit(field.of_some(np.arange(60)), 0.0), field, np.arange(72) >= 60, 0.0)
     places_m = np.array([[0.066, 0.0, 0.048], [0.052, 0.0, 0.048], [0.066, 0.012, 0.048], [0.066, -0.012, 0.048]])
     assert (shape.union.predict(places_m).mean_m > 0.0).tolist() == [False, True, True, True]
+
+
+def test_wrong_contacts_do_not_hide_what_turns() -> None:
+    points_m, normals = contacts_on(turned([0, 30, 42, 0], [0, 0, 90, 90]), 70, 6)
+    wrong = np.flatnonzero(np.abs(normals[:, 2]) < 0.5)[:4]
+    points_m[wrong] += np.array([[0.03], [0.02], [0.025], [0.035]]) * normals[wrong]
+    normals[wrong] = -normals[wrong]
+    field = Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad)
+    body, left = turned_without_strays(field, 0.0)
+    assert np.setdiff1d(np.arange(70), left).tolist() == wrong.tolist()
+    assert np.ptp(body.mesh().vertices, axis=0) == pytest.approx([0.084, 0.084, 0.090], abs=0.003)
+    assert np.isfinite(body.log_evidence)
 
 
 @pytest.mark.long
