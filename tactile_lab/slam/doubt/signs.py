@@ -93,6 +93,12 @@ def _confirmed(contact_map: ContactMap) -> NDArray[np.bool_]:
     return np.array([len(grasp.kept) >= _CONFIRMING for grasp in contact_map.placed])
 
 
+def _confirmed_steps(contact_map: ContactMap) -> NDArray[np.bool_]:
+    """Whether the contacts of the grasps before and after each step confirm where they are, shape (k - 1,)."""
+    confirmed = _confirmed(contact_map)
+    return confirmed[1:] & confirmed[:-1]
+
+
 def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     slips, bound = _slips(contact_map, noise)
     split, found = contact_map.space.translations, []
@@ -114,8 +120,7 @@ def _undone(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
 def _unlikely(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     slips, bound = _slips(contact_map, noise)
     probabilities = chi_squared_tail(np.sum(slips**2, axis=1), contact_map.space.size)
-    confirmed = _confirmed(contact_map)
-    doubtful = (probabilities < _INCREDIBLE) | ~(confirmed[1:] & confirmed[:-1])
+    doubtful = (probabilities < _INCREDIBLE) | ~_confirmed_steps(contact_map)
     return [
         Doubt(
             "unlikely-slip",
@@ -155,12 +160,14 @@ def _jumps(contact_map: ContactMap, noise: MotionNoise) -> list[Doubt]:
     expected = space.compose(contact_map.motions[1:], rows[:-1])
     away_m = np.linalg.norm(space.deviation(rows[1:], expected)[:, : space.translations], axis=1)
     alone = np.array([how is Moved.FREELY for how in contact_map.moved[1:]], dtype=bool)
+    grave = (away_m > _JUMP_m) | ~_confirmed_steps(contact_map)
     return [
         Doubt(
             "jump",
             f"the object is {1e3 * away_m[step]:.0f} mm from where the hand left it before grasp {step + 2}: "
             "did it fall, was it moved or exchanged?",
             (int(step) + 1,),
+            grave=bool(grave[step]),
         )
         for step in np.flatnonzero((away_m > _JUMP_m) | alone)
     ]
