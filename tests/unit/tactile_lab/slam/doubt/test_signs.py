@@ -89,6 +89,14 @@ def test_a_step_in_which_the_object_did_not_follow_the_hand_is_a_jump_however_sh
     assert (found.name, found.grasps, found.grave) == ("jump", (6,), True)
 
 
+def test_a_short_jump_between_grasps_that_confirm_their_places_is_only_told(true: ContactMap) -> None:
+    freely = true.with_placed(4, replace(true.placed[4], moved=Moved.FREELY))
+    far = turned(freely, slice(4, None), (0.12, 0.0, 0.0))
+    for moved, grave in ((freely, False), (leaving_out(freely, range(4, 5), 2), True), (far, True)):
+        (found,) = [doubt for doubt in signs(moved, NOISE) if doubt.name == "jump"]
+        assert (found.grasps, found.grave) == ((4,), grave)
+
+
 def test_contacts_that_fit_up_to_some_grasp_only_are_of_another_object(true: ContactMap) -> None:
     (found,) = signs(leaving_out(true, range(7, 12), 3), NOISE)
     assert (found.name, found.grasps) == ("other-object", (7, 8, 9, 10, 11))
