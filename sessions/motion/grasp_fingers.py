@@ -10,6 +10,7 @@ from drivers.shadow.closing.closing import Closing
 from drivers.shadow.closing.posture import HandShape
 from sessions.motion.cycle_settings import CycleSettings
 from sessions.motion.finger_gaps import is_near, nears
+from sessions.motion.finger_opening import FingerOpening
 from sessions.motion.motion import Motion
 
 _HASTE_N, _FLIGHT_N = 1.0, 3.0
@@ -174,36 +175,28 @@ class GraspFingers:
     def release(self) -> None:
         """Open the hand, every tip back along its path: a straight joint motion would dip into the table.
 
-        Overloaded fingers are released first, the others wait for them, unless they are in their way. One that falls
-        behind its target waits until it has followed: where joints are unlike late, its tip dips. A finger that is
-        pressed as it opens, or does not follow, is over the object or in its way: the hand rises once, and that finger
-        opens last.
+        A finger that is pressed as it opens, or does not follow, is over the object or in its way: the hand rises once,
+        and that finger opens last (:class:`FingerOpening`).
         """
         begun_N, begun_bent, has_risen = self._motion.loads_N(), self._held_up(), False
-        table, closed, opened = self.table, self.progress, _open(self.table)
-        step = next(iter(self._motion.shares(self._motion.finger_time_s(table, opened, self.settings.finger_rad_s))))
-        shares, behind = dict.fromkeys(self._fingers, 0.0), dict.fromkeys(self._fingers, 0)
-        patience = self._motion.cycles(_FOLLOWS_s)
-
-        def place(finger: str, share: float) -> float:
-            return closed[finger] + min(1.0, share) * (opened[finger] - closed[finger])
-
-        while closed_still := {finger for finger in self._fingers if shares[finger] < 1.0}:
-            late = self._held_up() - begun_bent
-            behind = {finger: behind[finger] + 1 if finger in late else 0 for finger in behind}
-            waiting = {finger for finger in late if behind[finger] <= patience}
-            resisted = self._resisted(begun_N) | late - waiting
+        opening = self._opening()
+        while still_closed := opening.still_closed:
+            opening.on_late(self._held_up() - begun_bent)
+            resisted = self._resisted(begun_N) | opening.held_back
             if resisted and not has_risen:
                 self.rise()
                 has_risen = True
-            urgent = closed_still & self._overloaded_fingers() - resisted - late
-            free = {finger for finger in closed_still if not self._nears(finger, place(finger, shares[finger] + step))}
-            able = free - waiting
-            for finger in urgent & free or able - resisted or able or closed_still - waiting:
-                shares[finger] = min(1.0, shares[finger] + step)
-            self.progress = {finger: place(finger, shares[finger]) for finger in closed}
-            self._motion.set_fingers(table, self.progress)
+            free = {finger for finger in still_closed if not self._nears(finger, opening.next_place(finger))}
+            opening.open_next(free, self._overloaded_fingers(), resisted)
+            self.progress = opening.progress
+            self._motion.set_fingers(self.table, self.progress)
             self._motion.tick()
+
+    def _opening(self) -> FingerOpening:
+        opened = _open(self.table)
+        duration_s = self._motion.finger_time_s(self.table, opened, self.settings.finger_rad_s)
+        step = next(iter(self._motion.shares(duration_s)))
+        return FingerOpening(self.progress, opened, step, self._motion.cycles(_FOLLOWS_s))
 
     def rise(self) -> None:
         """Up from over or beside the object, until it holds a fingertip back."""

@@ -207,7 +207,7 @@ def registered_mm(seen: SeenObject, dimension: int) -> float | None:
 
 
 def _as_it_lies(result: SlamResult, grasps: Sequence[Grasp], watch: ForceWatch) -> SeenObject:
-    """The object as it stood or, after a fall, lay when the model was made: its mesh upright there, and these grasps."""
+    """The object as it stood or, after a fall, lay when the model was made: its mesh upright there, and the grasps."""
     count = min(len(result.world_T_object), len(watch.truth), len(grasps))
     falls = [0, *(place for place, grasp in enumerate(grasps[:count]) if grasp.begins_anew)]
     last = max((place for place, pose in enumerate(result.world_T_object[:count]) if pose is not None), default=count)

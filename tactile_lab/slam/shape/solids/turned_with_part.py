@@ -57,9 +57,7 @@ def turned_without_strays(gpis: Gpis, floor_m: float, free_points_m: Array | Non
     return replace(body, log_evidence=body.log_evidence - float(left_out.sum())), np.flatnonzero(~strays)
 
 
-def _body(
-    gpis: Gpis, floor_m: float, free_points_m: Array | None, limits: tuple[int, float]
-) -> tuple[Turned, Mask]:
+def _body(gpis: Gpis, floor_m: float, free_points_m: Array | None, limits: tuple[int, float]) -> tuple[Turned, Mask]:
     """A body, and the contacts beside it, at least so many and at most such a share.
 
     Raises:
