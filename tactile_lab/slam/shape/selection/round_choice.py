@@ -11,7 +11,7 @@ from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.contradictions import checked_evidence, try_make
 from tactile_lab.slam.shape.solids.lying import Lying
 from tactile_lab.slam.shape.solids.turned import Turned
-from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts, turned_without_strays
+from tactile_lab.slam.shape.solids.turned_with_part import LEAST_OF_PARTS, Division
 
 _LARGEST_SHARE_OFF, _LARGEST_SHARE_OFF_WITH_PART = 0.01, 0.05
 
@@ -24,14 +24,23 @@ def revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_lea
     if "turned" in without:
         return None
     body: FittedShape | None = _turned(gpis, free_points_m, floor_m, at_least=at_least)
-    if body is None and "strays" not in without:
-        body = _turned_but_for_strays(gpis, free_points_m, floor_m, at_least=at_least)
+    least = 0 if body is None else LEAST_OF_PARTS
+    division = None if without >= {"parts", "strays"} else _division(gpis, free_points_m, floor_m, least)
+    if body is None and division is not None and "strays" not in without:
+        body = _turned_but_for_strays(division, free_points_m, floor_m, at_least=at_least)
     most = at_least if body is None or body.log_evidence is None else body.log_evidence
     lying = _lying(gpis, free_points_m, floor_m, at_least=most)
     body, most = (body, most) if lying is None else (lying, lying.log_evidence)
-    if "parts" in without:
+    if division is None or "parts" in without:
         return body
-    return _turned_with_part(gpis, free_points_m, floor_m, at_least=most) or body
+    return _turned_with_part(division, free_points_m, floor_m, at_least=most) or body
+
+
+def _division(gpis: Gpis, free_points_m: Array | None, floor_m: float, least: int) -> Division | None:
+    try:
+        return Division.of(gpis, floor_m, free_points_m, least=least)
+    except ShapeError:  # nothing here turns about an axis, or all of it does
+        return None
 
 
 def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> Turned | None:
@@ -49,14 +58,13 @@ def _turned(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least
 
 
 def _turned_but_for_strays(
-    gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float
+    division: Division, free_points_m: Array | None, floor_m: float, *, at_least: float
 ) -> Turned | None:
     """The solid of revolution that a few wrong contacts hide, as :func:`_turned`: a field bulges at each of them."""
-    try:
-        shape, rest = turned_without_strays(gpis, floor_m, free_points_m)
-    except ShapeError:  # no axis, or too many contacts beside it
+    shape = try_make(division.without_strays)
+    if not isinstance(shape, Turned):
         return None
-    off, others = _LARGEST_SHARE_OFF, gpis.of_some(rest)
+    off, others = _LARGEST_SHARE_OFF, division.gpis.of_some(np.flatnonzero(~division.beside))
     evidence = checked_evidence(shape, others, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
     return shape if evidence > at_least else None
 
@@ -72,12 +80,12 @@ def _lying(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least:
 
 
 def _turned_with_part(
-    gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float
+    division: Division, free_points_m: Array | None, floor_m: float, *, at_least: float
 ) -> FittedShape | None:
     """The solid of revolution with a part beside it, if it has more evidence, as :func:`_turned`."""
-    shape = try_make(lambda: turned_with_parts(gpis, floor_m, free_points_m))
+    shape = try_make(lambda: division.with_parts(floor_m, free_points_m))
     if shape is None:
         return None
     off = _LARGEST_SHARE_OFF_WITH_PART
-    evidence = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    evidence = checked_evidence(shape, division.gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
     return shape if evidence > at_least else None

@@ -33,7 +33,7 @@ from tactile_lab.slam.shape.solids.planes import divide
 from tactile_lab.slam.shape.solids.polyhedron import Polyhedron, contacts_of
 from tactile_lab.slam.shape.solids.prism import Prism
 from tactile_lab.slam.shape.solids.turned import Turned
-from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts, turned_without_strays
+from tactile_lab.slam.shape.solids.turned_with_part import Division
 from tactile_lab.slam.shape.solids.with_parts import ONE_PART_m, WithParts
 from tactile_lab.slam.shape.surfaces.surface import SurfaceMesh
 
@@ -141,10 +141,10 @@ def _rounder(
         return best
 
     def turn(some: Gpis) -> FittedShape:
-        if isinstance(round_, Turned):
-            return turned_without_strays(some, floor_m, free_points_m)[0]
-        fit = Lying.fit if isinstance(round_, Lying) else turned_with_parts
-        return fit(some, floor_m, free_points_m)
+        if isinstance(round_, Lying):
+            return Lying.fit(some, floor_m, free_points_m)
+        division = Division.of(some, floor_m, free_points_m)
+        return division.without_strays() if isinstance(round_, Turned) else division.with_parts(floor_m, free_points_m)
 
     return best if predicts_better_than(sharp, turn, gpis, COARSE_m, floor_m) else round_
 

@@ -1,12 +1,13 @@
 """A solid of revolution with a part beside it: a cup with its handle, a can with its spout, a teapot with both.
 
 Contacts are divided into those of the body, which turns about an axis, and those beside it, which make up parts
-(:mod:`tactile_lab.slam.shape.solids.with_parts`).
+(:mod:`tactile_lab.slam.shape.solids.with_parts`), or are wrong.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -29,52 +30,70 @@ _STEEPEST = 1.0
 _ON_BODY_m, _OFF_BODY_m = 0.003, 0.005
 _LEFT_OUT_nats = 12.0
 """A contact of the body that costs more than one outlier among twenty good contacts is one of the part."""
-_LARGEST_SHARE, _LEAST_CONTACTS, _LARGEST_SHARE_OF_STRAYS = 0.35, 2, 0.1
+_LARGEST_SHARE, LEAST_OF_PARTS, _LARGEST_SHARE_OF_STRAYS = 0.35, 2, 0.1
+"""Share of contacts that lie beside a body at most, number of them that makes up parts, and share that may be wrong."""
 
 
-def turned_with_parts(gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> WithParts:
-    """Divide the contacts of a field, and fit body and parts.
+@dataclass(frozen=True)
+class Division:
+    """Contacts divided into those of a solid of revolution and those beside it. Made by :meth:`of`.
 
-    Args:
-        gpis: a field fitted in space.
-        floor_m: height of the table that the object stands on.
-        free_points_m: places that a finger went through, shape (k, 3), or None.
-
-    Raises:
-        ShapeError: there is no axis, nothing lies beside a body, or so much that it is no body.
+    Attributes:
+        gpis: the field of all contacts.
+        body: fitted to its own.
+        beside: which are not its own, shape (n,).
     """
-    body, beside = _body(gpis, floor_m, free_points_m, (_LEAST_CONTACTS, _LARGEST_SHARE))
-    return WithParts.of(body, gpis, beside, floor_m, free_points_m)
+
+    gpis: Gpis
+    body: Turned
+    beside: Mask
+
+    @classmethod
+    def of(cls, gpis: Gpis, floor_m: float, free_points_m: Array | None = None, *, least: int = 0) -> Self:
+        """Divide the contacts of a field.
+
+        Args:
+            gpis: a field fitted in space.
+            floor_m: height of the table that the object stands on.
+            free_points_m: places that a finger went through, shape (k, 3), or None.
+            least: contacts that a body cannot have, at first sight; fewer are no reason to look closer.
+
+        Raises:
+            ShapeError: there is no axis, or so much lies beside a body that it is none, or less than asked for.
+        """
+        contacts = contacts_of(gpis)
+        beside = _check(_beside(contacts), least)
+        body = Turned.fit(gpis.of_some(np.flatnonzero(~beside)), floor_m, free_points_m)
+        divided = _check(_divide(contacts, beside, body))
+        if (divided != beside).any():
+            body = Turned.fit(gpis.of_some(np.flatnonzero(~divided)), floor_m, free_points_m)
+        return cls(gpis, body, divided)
+
+    def with_parts(self, floor_m: float, free_points_m: Array | None = None) -> WithParts:
+        """The body, and parts of what lies beside it.
+
+        Raises:
+            ShapeError: hardly anything does.
+        """
+        _check(self.beside, LEAST_OF_PARTS)
+        return WithParts.of(self.body, self.gpis, self.beside, floor_m, free_points_m)
+
+    def without_strays(self) -> Turned:
+        """The body alone, what lies beside it wrong, each contact at the price of an outlier.
+
+        Raises:
+            ShapeError: more lies beside it than sensors get wrong.
+        """
+        strays = np.flatnonzero(self.beside)
+        if len(strays) > _LARGEST_SHARE_OF_STRAYS * len(self.beside):
+            raise ShapeError(f"{len(strays)} of {len(self.beside)} contacts are no strays")
+        costs = _least_costs(contacts_of(self.gpis), strays) + 2 * np.log(2 * np.pi) + _LEFT_OUT_nats
+        return replace(self.body, log_evidence=self.body.log_evidence - float(costs.sum()))
 
 
-def turned_without_strays(gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> tuple[Turned, Indices]:
-    """Fit a body to all contacts but a few that lie beside it, each at the price of an outlier; and which are left.
-
-    Arguments and errors as of :func:`turned_with_parts`.
-    """
-    body, strays = _body(gpis, floor_m, free_points_m, (0, _LARGEST_SHARE_OF_STRAYS))
-    left_out = _least_costs(contacts_of(gpis), np.flatnonzero(strays)) + 2 * np.log(2 * np.pi) + _LEFT_OUT_nats
-    return replace(body, log_evidence=body.log_evidence - float(left_out.sum())), np.flatnonzero(~strays)
-
-
-def _body(gpis: Gpis, floor_m: float, free_points_m: Array | None, limits: tuple[int, float]) -> tuple[Turned, Mask]:
-    """A body, and the contacts beside it, at least so many and at most such a share.
-
-    Raises:
-        ShapeError: there is no axis, or fewer contacts or more lie beside it.
-    """
-    contacts = contacts_of(gpis)
-    beside = _check(_beside(contacts), *limits)
-    body = Turned.fit(gpis.of_some(np.flatnonzero(~beside)), floor_m, free_points_m)
-    divided = _check(_divide(contacts, beside, body), *limits)
-    if (divided != beside).any():
-        body = Turned.fit(gpis.of_some(np.flatnonzero(~divided)), floor_m, free_points_m)
-    return body, divided
-
-
-def _check(beside: Mask, least: int, largest_share: float) -> Mask:
+def _check(beside: Mask, least: int = 0) -> Mask:
     count = np.count_nonzero(beside)
-    if not least <= count <= largest_share * len(beside):
+    if not least <= count <= _LARGEST_SHARE * len(beside):
         raise ShapeError(f"{count} of {len(beside)} contacts lie beside a solid of revolution")
     return beside
 

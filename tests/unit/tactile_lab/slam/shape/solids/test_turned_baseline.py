@@ -13,7 +13,7 @@ from tactile_lab.slam.shape.solids.axis import find_axis, misfit_around, split, 
 from tactile_lab.slam.shape.solids.planes import WeightedContacts, weighted_contacts
 from tactile_lab.slam.shape.solids.revolving import generatrix, revolve
 from tactile_lab.slam.shape.solids.turned import Turned
-from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts
+from tactile_lab.slam.shape.solids.turned_with_part import Division
 from tactile_lab.slam.shape.solids.with_parts import WithParts
 from tactile_lab.slam.shape.surfaces.surface import Contour, SurfaceMesh
 from tests.support.baseline import assert_baseline
@@ -236,7 +236,7 @@ def test_contacts_beside_a_body_that_turns() -> None:
         sides = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
         field = field_of(np.vstack([points_m, bar_m]), np.vstack([normals, sides]))
         try:
-            shape = turned_with_parts(field, 0.0)
+            shape = Division.of(field, 0.0).with_parts(0.0)
             values.append([len(shape.parts), sum(len(part.contacts_m) for part in shape.parts)])
         except ShapeError as error:
             values.append([str(error)[:2], 0])

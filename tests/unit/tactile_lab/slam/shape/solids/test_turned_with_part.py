@@ -12,7 +12,7 @@ from tactile_lab.experiments.data.household import HOUSEHOLD, turned
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.selection.planar_choice import best_shape
 from tactile_lab.slam.shape.solids.turned import Turned
-from tactile_lab.slam.shape.solids.turned_with_part import turned_with_parts, turned_without_strays
+from tactile_lab.slam.shape.solids.turned_with_part import Division
 from tactile_lab.slam.shape.solids.with_parts import WithParts
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh
 from tests.support.shape_examples import NORMAL_SIGMA_rad, POINT_SIGMA_m
@@ -46,7 +46,7 @@ def felt(seed: int, count: int = 80) -> tuple[Gpis, Array]:
 
 def test_the_part_is_told_from_the_body_and_both_are_one_closed_surface() -> None:
     field, on_bar = felt(seed=3)
-    shape = turned_with_parts(field, 0.0)
+    shape = Division.of(field, 0.0).with_parts(0.0)
     assert isinstance(shape.body, Turned)
     assert np.abs(shape.body.axis_m - AXIS_m[:2]).max() < 0.002
     found_m = np.vstack([part.contacts_m for part in shape.parts])
@@ -65,7 +65,7 @@ def distances_among(wanted_m: Array, found_m: Array) -> Array:
 
 
 def test_a_fin_felt_on_its_sides_is_solid() -> None:
-    shape = turned_with_parts(felt(seed=3)[0], 0.0)
+    shape = Division.of(felt(seed=3)[0], 0.0).with_parts(0.0)
     middles_m = AXIS_m + np.column_stack([np.linspace(0.040, 0.060, 6), np.zeros(6), np.full(6, 0.05)])
     assert shape.union.predict(middles_m).mean_m.max() < 0.0
 
@@ -88,8 +88,9 @@ def test_wrong_contacts_do_not_hide_what_turns() -> None:
     points_m[wrong] += np.array([[0.03], [0.02], [0.025], [0.035]]) * normals[wrong]
     normals[wrong] = -normals[wrong]
     field = Gpis.fit(points_m, normals, POINT_SIGMA_m, NORMAL_SIGMA_rad)
-    body, left = turned_without_strays(field, 0.0)
-    assert np.setdiff1d(np.arange(70), left).tolist() == wrong.tolist()
+    division = Division.of(field, 0.0)
+    assert np.flatnonzero(division.beside).tolist() == wrong.tolist()
+    body = division.without_strays()
     assert np.ptp(body.mesh().vertices, axis=0) == pytest.approx([0.084, 0.084, 0.090], abs=0.003)
     assert np.isfinite(body.log_evidence)
 
@@ -106,6 +107,6 @@ def test_it_is_chosen_by_evidence_unless_it_is_left_out() -> None:
 
 def test_nothing_lies_beside_a_cup_and_a_box_has_no_body() -> None:
     with pytest.raises(ShapeError, match="lie beside a solid of revolution"):
-        turned_with_parts(field_on(HOUSEHOLD["cup"](), 100, seed=3), 0.0)
+        Division.of(field_on(HOUSEHOLD["cup"](), 100, seed=3), 0.0).with_parts(0.0)
     with pytest.raises(ShapeError):
-        turned_with_parts(field_on(box_mesh(), 100, seed=3), 0.0)
+        Division.of(field_on(box_mesh(), 100, seed=3), 0.0).with_parts(0.0)
