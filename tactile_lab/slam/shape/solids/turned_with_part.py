@@ -42,11 +42,13 @@ class Division:
         gpis: the field of all contacts.
         body: fitted to its own.
         beside: which are not its own, shape (n,).
+        impossible: how many no body can have; others beside this one are only improbable.
     """
 
     gpis: Gpis
     body: Turned
     beside: Mask
+    impossible: int
 
     @classmethod
     def of(cls, gpis: Gpis, floor_m: float, free_points_m: Array | None = None, *, least: int = 0) -> Self:
@@ -56,7 +58,7 @@ class Division:
             gpis: a field fitted in space.
             floor_m: height of the table that the object stands on.
             free_points_m: places that a finger went through, shape (k, 3), or None.
-            least: contacts that a body cannot have, at first sight; fewer are no reason to look closer.
+            least: contacts that no body can have; fewer are no reason to look closer.
 
         Raises:
             ShapeError: there is no axis, or so much lies beside a body that it is none, or less than asked for.
@@ -67,14 +69,16 @@ class Division:
         divided = _check(_divide(contacts, beside, body))
         if (divided != beside).any():
             body = Turned.fit(gpis.of_some(np.flatnonzero(~divided)), floor_m, free_points_m)
-        return cls(gpis, body, divided)
+        return cls(gpis, body, divided, int(beside.sum()))
 
     def with_parts(self, floor_m: float, free_points_m: Array | None = None) -> WithParts:
         """The body, and parts of what lies beside it.
 
         Raises:
-            ShapeError: hardly anything does.
+            ShapeError: hardly any contact has to.
         """
+        if self.impossible < LEAST_OF_PARTS:
+            raise ShapeError(f"{self.impossible} contacts that cannot lie on a body make up no part")
         _check(self.beside, LEAST_OF_PARTS)
         return WithParts.of(self.body, self.gpis, self.beside, floor_m, free_points_m)
 
