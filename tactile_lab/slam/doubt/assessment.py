@@ -84,7 +84,7 @@ def assess(
     if shape is not None:
         stands = settings.freedom == "table"
         floor_m = -origin_height_m if stands else None
-        reach_m = reach_for(shape, sum(grasp.used for grasp in contact_map.placed))
+        reach_m = reach_for(contact_map.contacts, sum(grasp.used for grasp in contact_map.placed))
         part = known_part(shape, contact_map.contacts, floor_m, contact_map.free_points_m, reach_m=reach_m)
         if isinstance(shape, SurfaceMesh):
             missing = [*missing_parts(contact_map, shape, floor_m), *doubts_of_top(shape, part.unfelt)]

@@ -35,7 +35,7 @@ mm know nine tenths of it.
 """
 
 _HAND_SIZED_m = 0.150
-"""Longest side of what that was measured on; features of larger objects are larger, and farther from each other."""
+"""Longest side of what that was measured on; features of larger objects are larger."""
 
 LARGEST_GUESS_m = 0.040
 """No guess is more uncertain than this."""
@@ -114,17 +114,17 @@ def known_part(
     return KnownPart(near, known, min(share, 1.0), distances_m, unfelt)
 
 
-def reach_for(shape: Contour | SurfaceMesh, grasps: int) -> float:
+def reach_for(contacts: ContactSet, grasps: int) -> float:
     """How far from a contact a shape is known, in metres.
 
     Args:
-        shape: the outline or surface.
+        contacts: those that the estimate uses; a guess beyond them makes an object no larger.
         grasps: number of them that it is made of.
     """
     if grasps < LEAST_GRASPS:
         return _REACH_ALONE_m
-    points_m = shape.points_m if isinstance(shape, Contour) else shape.vertices
-    return min(REACH_m * max(1.0, float(np.ptp(points_m, axis=0).max()) / _HAND_SIZED_m), LARGEST_GUESS_m)
+    longest_m = float(np.ptp(contacts.points_m, axis=0).max(initial=0.0))
+    return min(REACH_m * max(1.0, longest_m / _HAND_SIZED_m), LARGEST_GUESS_m)
 
 
 def with_guesses_told(shape: _Shape, part: KnownPart) -> _Shape:

@@ -55,8 +55,9 @@ def test_the_tip_of_a_wedge_is_known_from_both_its_faces() -> None:
     [(0.09, 8, 0.025), (0.15, 3, 0.025), (0.18, 8, 0.030), (0.40, 8, LARGEST_GUESS_m), (0.40, 2, 0.010)],
 )
 def test_large_objects_are_known_farther_from_contacts(longest_m: float, grasps: int, reach_m: float) -> None:
-    large = Contour(SQUARE_m * [longest_m / 0.09, 1.0], np.full(len(SQUARE_m), 0.001), is_closed=True)
-    assert reach_for(large, grasps) == pytest.approx(reach_m)
+    far_apart = touched(RIGHT, LEFT)
+    far_apart = replace(far_apart, points_m=far_apart.points_m * [longest_m / 0.09, 1.0])
+    assert reach_for(far_apart, grasps) == pytest.approx(reach_m)
 
 
 def test_nothing_is_known_without_contacts_or_where_the_shape_is_uncertain() -> None:
