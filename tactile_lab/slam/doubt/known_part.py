@@ -123,7 +123,7 @@ def reach_for(contacts: ContactSet, grasps: int) -> float:
     """
     if grasps < LEAST_GRASPS:
         return _REACH_ALONE_m
-    longest_m = float(np.ptp(contacts.points_m, axis=0).max(initial=0.0))
+    longest_m = float(np.ptp(contacts.points_m, axis=0).max())
     return min(REACH_m * max(1.0, longest_m / _HAND_SIZED_m), LARGEST_GUESS_m)
 
 
