@@ -29,6 +29,11 @@ from sessions.perception.carrying.slip import Slip
 _LEAST_HOLD_N = 0.1
 """A fingertip that presses less holds nothing."""
 
+_BESIDE_m, _BESIDE_m_s = 0.05, 0.05
+"""So far up the hand may still be beside the object that it let go, and how fast it rises there: a fingertip pressed with
+2 N at the speed of travel, with 0.6 N at this one.
+"""
+
 _BELOW_TOP_m = 0.012
 """So far at least the fingertips' centres stay below it where a grasp is tried again higher."""
 
@@ -307,10 +312,15 @@ class GraspCycle:
         self.fingers.release()
 
     def lift(self) -> None:
-        """Back along the approach, where the hand came from the side, then straight up."""
+        """Back along the approach, where the hand came from the side, then straight up.
+
+        From beside the object the open fingers may be under what is wider above: they pass it slowly.
+        """
         s, motion = self.settings, self._motion
         if self._away_m:
             motion.move_base(motion.base_joints(self.plan.frame, self._table(), 0.0, self._away_m), s.travel_m_s, 1.0)
+        else:
+            motion.climb(self._above(), _BESIDE_m_s, _BESIDE_m)
         motion.move_base(self._above(), s.travel_m_s, s.turn_rad_s)
 
     def idle(self) -> None:

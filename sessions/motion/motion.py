@@ -205,10 +205,10 @@ class Motion:
         q[:3] += self.runtime.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, height_m]))
         return q
 
-    def climb(self, q: Array, speed_m_s: float) -> None:
-        """Straight up to the height of ``q``, shape (6,), if the positioner is lower: up, before it goes over."""
+    def climb(self, q: Array, speed_m_s: float, most_m: float = np.inf) -> None:
+        """Straight up toward the height of ``q``, shape (6,), by ``most_m`` at most, if the positioner is lower."""
         up_m = self.runtime.world_T_mount.rotation().unrotate(np.array([0.0, 0.0, 1.0]))
-        missing_m = float(up_m @ (q[:3] - self._base_q[:3]))
+        missing_m = min(float(up_m @ (q[:3] - self._base_q[:3])), most_m)
         if missing_m > _LEVEL_m:
             self.rise(missing_m, speed_m_s)
 
