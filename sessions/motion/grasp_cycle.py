@@ -30,7 +30,7 @@ _LEAST_HOLD_N = 0.1
 """A fingertip that presses less holds nothing."""
 
 _BESIDE_m, _BESIDE_m_s = 0.05, 0.05
-"""So far up the hand may still be beside the object that it let go, and how fast it rises there: a fingertip pressed with
+"""So far up the hand may be beside the object that it let go, and how fast it rises there: a fingertip pressed with
 2 N at the speed of travel, with 0.6 N at this one.
 """
 
