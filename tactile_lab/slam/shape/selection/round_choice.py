@@ -9,7 +9,7 @@ from drivers.core.errors import ShapeError
 from tactile_lab.slam.shape.fields.gpis import Gpis
 from tactile_lab.slam.shape.model import FittedShape
 from tactile_lab.slam.shape.selection.contradictions import checked_evidence, try_make
-from tactile_lab.slam.shape.solids.lying import Lying
+from tactile_lab.slam.shape.solids.lying import Leaning, Lying
 from tactile_lab.slam.shape.solids.turned import Turned
 from tactile_lab.slam.shape.solids.turned_with_part import LEAST_OF_PARTS, Division
 
@@ -31,9 +31,9 @@ def revolving(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_lea
     most = at_least if body is None or body.log_evidence is None else body.log_evidence
     lying = _lying(gpis, free_points_m, floor_m, at_least=most)
     body, most = (body, most) if lying is None else (lying, lying.log_evidence)
-    if division is None or "parts" in without:
-        return body
-    return _turned_with_part(division, free_points_m, floor_m, at_least=most) or body
+    if division is not None and "parts" not in without:
+        body = _turned_with_part(division, free_points_m, floor_m, at_least=most) or body
+    return body or _leaning(gpis, free_points_m, floor_m, at_least=at_least)
 
 
 def _division(gpis: Gpis, free_points_m: Array | None, floor_m: float, least: int) -> Division | None:
@@ -75,6 +75,18 @@ def _lying(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least:
     if not isinstance(shape, Lying):
         return None
     off = _LARGEST_SHARE_OFF
+    checked = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
+    return shape if np.isfinite(checked) else None
+
+
+def _leaning(gpis: Gpis, free_points_m: Array | None, floor_m: float, *, at_least: float) -> FittedShape | None:
+    """The solid of revolution that leans, with a part or without, if none stands or lies, as :func:`_lying`."""
+    if not np.isfinite(at_least) or not gpis.settings.without.isdisjoint({"parts", "strays"}):
+        return None
+    shape = try_make(lambda: Leaning.fit(gpis, floor_m, free_points_m))
+    if shape is None:
+        return None
+    off = _LARGEST_SHARE_OFF_WITH_PART
     checked = checked_evidence(shape, gpis, free_points_m, floor_m, at_least=at_least, largest_share_off=off)
     return shape if np.isfinite(checked) else None
 

@@ -1,4 +1,4 @@
-"""Bottles on their side, felt from above and from both sides."""
+"""Bottles on their side, felt from above and from both sides, and what leans."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from drivers.core.contacts import Array
 from drivers.core.errors import ShapeError
 from tactile_lab.experiments.data.household import turned
 from tactile_lab.slam.shape.fields.gpis import Gpis
-from tactile_lab.slam.shape.solids.lying import Lying
+from tactile_lab.slam.shape.solids.lying import Leaning, Lying
 from tactile_lab.slam.shape.surfaces.sampling import distances_to_mesh, sample_mesh_with_normals
 
 HEADING_rad = np.deg2rad(33.0)
@@ -63,3 +63,29 @@ def test_a_box_has_no_axis() -> None:
     box.apply_translation([0.0, 0.0, 0.02])
     with pytest.raises(ShapeError):
         Lying.fit(felt(box), 0.0)
+
+
+def leaning_tub(lean_rad: float) -> trimesh.Trimesh:
+    """A solid of revolution that leans on the edge of its foot, its lowest point on the table."""
+    tub = turned([0, 30, 40, 38, 0], [0, 0, 45, 90, 90])
+    tub.apply_transform(trimesh.transformations.rotation_matrix(lean_rad, [1.0, 0.3, 0.0]))  # type: ignore[no-untyped-call]
+    tub.apply_translation([0.01, -0.005, -tub.bounds[0, 2]])
+    return tub
+
+
+def test_what_leans_is_found_with_its_lean() -> None:
+    shape = Leaning.fit(felt(leaning_tub(0.2), 90), 0.0)
+    assert shape.name == "leaning turned"
+    assert np.arccos(shape.along[2, 2]) == pytest.approx(0.2, abs=0.03)
+    surface = shape.mesh()
+    assert trimesh.Trimesh(surface.vertices, surface.faces, process=False).is_watertight
+    assert surface.vertices[:, 2].min() == pytest.approx(0.0, abs=0.004)
+    above = surface.vertices[:, 2] > 0.012
+    assert distances_to_mesh(surface.vertices[above], leaning_tub(0.2)).max() < 0.003
+
+
+def test_what_stands_or_is_not_round_does_not_lean() -> None:
+    with pytest.raises(ShapeError, match="no axis leans"):
+        Leaning.fit(felt(leaning_tub(0.0), 90), 0.0)
+    with pytest.raises(ShapeError, match="do not meet an axis that leans"):
+        Leaning.fit(felt(trimesh.creation.box([0.06, 0.05, 0.07]), 90), -0.035)
