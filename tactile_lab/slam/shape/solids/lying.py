@@ -42,6 +42,9 @@ _OUTLYING, _LARGEST_MISFIT = 9.0, 2.0
 """Squares of normals, in variances, that count no more, and their mean where no axis leans so."""
 
 _LEAN_TRIES, _LEAN_ROUNDS, _SIMPLEX_rad, _FLAT = 80, 2, np.deg2rad(1.5), 0.01
+_LEAST_CONTACTS = 40
+"""Fewer on an ellipsoid fit some solid that leans as well."""
+
 _MOVED_m = 0.040
 """An axis that moves aside by as much as one that leans by a radian more."""
 
@@ -148,8 +151,10 @@ def _leaning(gpis: Gpis, contacts: WeightedContacts) -> Array:
     """Axes of the frame whose z is the likeliest axis near the one that normals pass nearest by, as rows.
 
     Raises:
-        ShapeError: there is none, or it stands.
+        ShapeError: there is none, or it stands, or contacts are too few.
     """
+    if len(contacts) < _LEAST_CONTACTS:
+        raise ShapeError(f"{len(contacts)} contacts are too few for an axis that leans")
     leans = np.arange(-_LARGEST_LEAN_rad, _LARGEST_LEAN_rad + 1e-9, _LEAN_STEP_rad)
     grid = [np.array([x, y]) for x in leans for y in leans if np.hypot(x, y) <= _LARGEST_LEAN_rad + 1e-9]
     start = min(grid, key=lambda lean: _lean_misfit(lean, contacts))
