@@ -53,33 +53,20 @@ _LOW = 0.25
 
 
 @dataclass(frozen=True)
-class Lying:
-    """A solid of revolution with a horizontal axis; implements FittedShape. Made by :meth:`fit`.
+class _Tipped:
+    """A solid of revolution whose axis is not upright.
 
     Attributes:
-        along: axes of a frame whose z is the axis and whose y is up, as rows, shape (3, 3).
-        body: the solid in that frame.
+        along: axes of a frame whose z is the axis, as rows, shape (3, 3).
+        body: the solid in that frame, with parts beside it perhaps.
         floor_m: height of the table.
-        log_evidence: of the body, minus the price of the heading.
-        name: "lying turned".
+        log_evidence: of the body, minus the price of the axis' direction.
     """
 
     along: Array
-    body: Turned
+    body: FittedShape
     floor_m: float
     log_evidence: float
-    name: str = "lying turned"
-
-    @classmethod
-    def fit(cls, gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> Self:
-        """Fit heading, axis and profile to the contacts of a field; arguments and errors as of :meth:`Turned.fit`."""
-        contacts = contacts_of(gpis)
-        heading_rad = _heading_rad(contacts)
-        along = _seen_along(_likeliest_rad(gpis, contacts, heading_rad))
-        body = _turned(gpis, along, free_points_m)
-        sigma_rad = float(contacts.normal_weights.sum() ** -0.5)
-        price = np.log(np.pi / (np.sqrt(2 * np.pi) * sigma_rad))
-        return cls(along, body, floor_m, float(body.log_evidence - price))
 
     def contour(self, resolution_m: float = 0.001) -> Contour:
         """Raises ShapeError: a solid has no outline."""
@@ -95,21 +82,32 @@ class Lying:
 
 
 @dataclass(frozen=True)
-class Leaning:
-    """A solid of revolution whose axis leans, with parts beside it or without; implements FittedShape. Made by
-    :meth:`fit`.
+class Lying(_Tipped):
+    """A solid of revolution with a horizontal axis, the frame's y up; implements FittedShape. Made by :meth:`fit`.
 
     Attributes:
-        along: axes of a frame whose z is the axis, as rows, shape (3, 3).
-        upright: the solid in that frame.
-        floor_m: height of the table.
-        log_evidence: of the solid, minus the price of the lean.
+        name: "lying turned".
     """
 
-    along: Array
-    upright: FittedShape
-    floor_m: float
-    log_evidence: float
+    name: str = "lying turned"
+
+    @classmethod
+    def fit(cls, gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> Self:
+        """Fit heading, axis and profile to the contacts of a field; arguments and errors as of :meth:`Turned.fit`."""
+        contacts = contacts_of(gpis)
+        heading_rad = _heading_rad(contacts)
+        along = _seen_along(_likeliest_rad(gpis, contacts, heading_rad))
+        body = _turned(gpis, along, free_points_m)
+        sigma_rad = float(contacts.normal_weights.sum() ** -0.5)
+        price = np.log(np.pi / (np.sqrt(2 * np.pi) * sigma_rad))
+        return cls(along, body, floor_m, float(body.log_evidence - price))
+
+
+@dataclass(frozen=True)
+class Leaning(_Tipped):
+    """A solid of revolution whose axis leans, with parts beside it or without; implements FittedShape. Made by
+    :meth:`fit`.
+    """
 
     @classmethod
     def fit(cls, gpis: Gpis, floor_m: float, free_points_m: Array | None = None) -> Self:
@@ -120,31 +118,19 @@ class Leaning:
         """
         contacts = contacts_of(gpis)
         along = _leaning(gpis, contacts)
-        free_m = np.empty((0, 3)) if free_points_m is None else np.reshape(free_points_m, (-1, 3))
+        free_m = None if free_points_m is None else np.reshape(free_points_m, (-1, 3)) @ along.T
         foot_m = _foot_m(_rotated(contacts, along), along @ [0.0, 0.0, 1.0], floor_m)
-        division = Division.of(_seen_by(gpis, along), foot_m, free_m @ along.T)
+        division = Division.of(_seen_by(gpis, along), foot_m, free_m)
         has_parts = division.impossible >= LEAST_OF_PARTS
-        upright = division.with_parts(foot_m, free_m @ along.T) if has_parts else division.without_strays()
+        body = division.with_parts(foot_m, free_m) if has_parts else division.without_strays()
         sigma_rad = float(contacts.normal_weights.sum() ** -0.5)
         price = 2 * np.log(2 * _LARGEST_LEAN_rad / (np.sqrt(2 * np.pi) * sigma_rad))
-        return cls(along, upright, floor_m, float((upright.log_evidence or 0.0) - price))
+        return cls(along, body, floor_m, float((body.log_evidence or 0.0) - price))
 
     @property
     def name(self) -> str:
         """Of the solid, "leaning"."""
-        return f"leaning {self.upright.name}"
-
-    def contour(self, resolution_m: float = 0.001) -> Contour:
-        """Raises ShapeError: a solid has no outline."""
-        raise ShapeError("contacts in space have a surface, not an outline", hint="Ask for the mesh")
-
-    def mesh(self, resolution_m: float = 0.003, floor_m: float | None = None) -> SurfaceMesh:
-        """The surface, watertight; it always ends at the table.
-
-        Raises:
-            ShapeError: the profile encloses nothing.
-        """
-        return _back(self.upright.mesh(resolution_m), self.along).above(self.floor_m if floor_m is None else floor_m)
+        return f"leaning {self.body.name}"
 
 
 def _leaning(gpis: Gpis, contacts: WeightedContacts) -> Array:
@@ -163,7 +149,7 @@ def _leaning(gpis: Gpis, contacts: WeightedContacts) -> Array:
         raise ShapeError("the contacts' normals do not meet an axis that leans")
     seen = _rotated(contacts, _tilted(lean))
     met = squares_around(seen, find_axis(seen)[0])[0] < _OUTLYING
-    body = WeightedContacts(*(each[met] for each in vars(contacts).values()))
+    body = contacts.of(np.flatnonzero(met))
     for _ in range(_LEAN_ROUNDS):
         lean = _likeliest_lean(gpis, body, lean)
     if not _LEAST_LEAN_rad < np.linalg.norm(lean) < _LARGEST_LEAN_rad:
@@ -264,8 +250,8 @@ def _turned(gpis: Gpis, along: Array, free_points_m: Array | None) -> Turned:
 
     Errors of poses dent a field in space, but not a rigid body: they are noise for it, so its noise is estimated.
     """
-    free_m = np.empty((0, 3)) if free_points_m is None else free_points_m
-    body = Turned.fit(_seen_by(gpis, along), None, np.reshape(free_m, (-1, 3)) @ along.T, _LARGEST_GAP_rad)
+    free_m = None if free_points_m is None else np.reshape(free_points_m, (-1, 3)) @ along.T
+    body = Turned.fit(_seen_by(gpis, along), None, free_m, _LARGEST_GAP_rad)
     half = body.half.optimise(noise=True)
     gained = half.log_marginal_likelihood() - body.half.log_marginal_likelihood() - _NOISE_PRICE_nats
     return body if gained < 0 else replace(body, half=half, log_evidence=body.log_evidence + gained)

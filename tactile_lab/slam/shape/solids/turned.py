@@ -141,8 +141,7 @@ class Turned:
 
     def half_of(self, contacts: WeightedContacts, chosen: NDArray[np.bool_]) -> Gpis:
         """The field of the profile of some contacts in space, about this axis and with this kernel."""
-        some = WeightedContacts(*(each[chosen] for each in vars(contacts).values()))
-        return half_like(self.half, some, self.axis_m)
+        return half_like(self.half, contacts.of(np.flatnonzero(chosen)), self.axis_m)
 
     def predict(self, points_m: Array) -> Prediction:
         """The field of the profile, with its gradient, at points of shape (q, 3)."""
